@@ -19,29 +19,22 @@ joint with friction usually have, so that a user need not know the catalogue. `m
 
 import abc
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import signals, units
+from ranger_sim.sysid import balance_candidates, signals
+from ranger_sim.sysid.balance_candidates import Signals
 from ranger_sim.sysid.dataset import Array, Table
-from ranger_sim.sysid.machine import PARAMETER, Columns, Effect, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.forms import Shape
+from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 
 AT_REST = 0.01  # of the fastest rate: about it the sign of the rate turns
 SHARPER = 4.0  # times; the base mixes the two signs
 CLOSE = 1.0 - 1e-12  # of a sign that is not infinitely far from its middle
-SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
-PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
-LIMITS = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95)  # of the largest input: where it may saturate
-ZONES = (0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest input: where nothing may come of it
-RADIAN = units.Unit(("rad",))
 SLOPE_S = 0.002  # Gaussian of a rate that is not measured
 SAME_WAY = 0.99  # correlation of a rate's integral with a channel, straight lines taken off: it is that channel's rate
-
-Shape = Mapping[str, float]
-Signals = Mapping[str, Array]
-Made = Callable[[Signals, Shape], Sequence[Array]]  # the columns, (n,), of an effect at a shape
 
 
 class Balance(abc.ABC):
@@ -132,7 +125,7 @@ class Balance(abc.ABC):
         s["rate"] = table[self.rate] if self.rate else signals.derivative(table, table[self.angle], width)
         s["angle"] = table[self.angle] if self.angle else signals.integral(table, s["rate"])
         s["acceleration"] = signals.per_run(table, lambda part: np.gradient(part, table.step_s), s["rate"])
-        s["direction"] = np.tanh(s["rate"] / (AT_REST * _top(s["rate"])))
+        s["direction"] = np.tanh(s["rate"] / (AT_REST * balance_candidates.fastest(s["rate"])))
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """The joint's signals, or all channels but the response."""
@@ -140,144 +133,17 @@ class Balance(abc.ABC):
         names = joint or [each.name for each in self.quantities if each.name not in ("", self.response)]
         return {self.response: {name: recording.signals[name] for name in (*names, "t") if name in recording.signals}}
 
-    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
-        """Candidates of the response's sensor, of every input, of the joint, and this machine's own."""
-        found = [
-            self._effect("sensor_offset", self.response, ("offset",), lambda s, _: [np.ones_like(s["t"])]),
-            self._effect("sensor_drift", self.response, ("per_s",), lambda s, _: [s["t"]]),
-            self._lag(),
-        ]
-        for each in self.quantities:
-            if each.is_input and each.name != self.response:
-                found += self._of_input(each.name, max(float(np.max(np.abs(r.signals[each.name]))) for r in recordings))
-        if self.angle or self.rate:
-            found += self._of_joint(recordings)
-        found += self._of_parameters(recordings)
-        own = self.more(recordings[0].signals)
-        for cause, columns in own.items():
-            names = tuple(f"size_{number}" for number in range(1, 1 + len(columns))) if len(columns) > 1 else ("size",)
-            found.append(self._effect(cause, self.name, names, self._of_machine(cause)))
-        return found
-
-    def _of_machine(self, cause: str) -> Made:
-        return lambda s, _: self.more(s)[cause]
-
-    def _effect(
-        self,
-        cause: str,
-        at: str,
-        names: tuple[str, ...],
-        make: Made,
-        shapes: Sequence[Shape] = ({},),
-        form: str = "",
-        forms: int = 1,
-        scale: str | None = None,
-    ) -> Effect:
-        def columns(recording: Recording, shape: Shape, _: Values) -> Columns:
-            return {self.response: np.column_stack(make(recording.signals, shape))}
-
-        part = "sensor" if cause.startswith("sensor_") else PARAMETER if cause == "parameter_drift" else "mechanical"
-        return Effect(cause, at, part, names, list(shapes), columns, form=form, forms=forms, scale=scale)
-
-    def _lag(self) -> Effect:
-        def columns(recording: Recording, _: Shape, values: Values) -> Columns:
-            made = recording.equations[self.response].columns
-            shown = sum(
-                (values.get(name, 0.0) * column for name, column in made.items()), np.zeros(len(recording.table))
-            )
-            step_s = recording.table.step_s
-            slope = signals.per_run(recording.table, lambda part: np.gradient(part, step_s), shown)
-            return {self.response: -slope[:, None]}
-
-        return Effect("sensor_lag", self.response, "sensor", ("lag_s",), [{}], columns)
-
-    def _load_friction(self, joint: str) -> Effect:
-        """Friction in proportion to the load: to inertia, gravity and what else of the machine is not a friction.
-
-        It is of a fit with gravity and friction, whether or not the machine has them; a load that is measured would
-        explain the response by itself.
+    def again(
+        self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
+    ) -> Recording:
+        """The recording for another search, with these effects in what a late sensor measures; itself where none is
+        late. Rows do not count where what it shows is of a time at which nothing is known: before a run, and at rest.
         """
+        return balance_candidates.behind(self, recording, effects)
 
-        def columns(recording: Recording, _: Shape, __: Values) -> Columns:
-            s, equation = recording.signals, recording.equations[self.response]
-            columns = [s["rate"], s["direction"], np.ones_like(s["t"]), np.cos(s["angle"]), np.sin(s["angle"])]
-            columns += equation.columns.values()
-            both, valid = np.column_stack(columns), equation.valid
-            size = np.linalg.lstsq(both[valid], equation.response[valid], rcond=None)[0]
-            loads = [k for k, each in enumerate(columns) if np.ptp(each) > 0.0 and np.any(each * s["direction"] < 0.0)]
-            return {self.response: (s["direction"] * np.abs(both[:, loads] @ size[loads]))[:, None]}
-
-        return Effect("load_friction", joint, "mechanical", ("share",), [{}], columns)
-
-    def _of_input(self, name: str, top: float) -> list[Effect]:
-        def saturated(s: Signals, p: Shape) -> list[Array]:
-            return [-np.sign(s[name]) * np.maximum(np.abs(s[name]) - p["limit"], 0.0)]
-
-        def dead(s: Signals, p: Shape) -> list[Array]:
-            return [-np.clip(s[name], -p["zone"], p["zone"])]
-
-        limits, zones = [{"limit": share * top} for share in LIMITS], [{"zone": share * top} for share in ZONES]
-        return [
-            self._effect("saturation", name, ("share",), saturated, limits, scale="limit"),
-            self._effect("dead_zone", name, ("share",), dead, zones, scale="zone"),
-        ]
-
-    def _of_parameters(self, recordings: Sequence[Recording]) -> list[Effect]:
-        """Drifts of the parameters; one whose column is a constant drifts as the response's sensor does."""
-        first = recordings[0].equations[self.response].columns
-        names = [each.name for each in self.parameters if each.name in first and np.ptp(first[each.name]) > 0.0]
-        return [self._effect("parameter_drift", name, ("per_s",), self._ramp(name)) for name in names]
-
-    def _ramp(self, name: str) -> Made:
-        return lambda s, _: [self.columns(s)[name] * s["t"]]
-
-    def _of_joint(self, recordings: Sequence[Recording]) -> list[Effect]:
-        top = max(_top(each.signals["rate"]) for each in recordings)
-        reach = max(float(np.ptp(each.signals["angle"])) for each in recordings)
-        angle_unit = next((units.unit_of(each.unit) for each in self.quantities if each.name == self.angle), RADIAN)
-        turns = angle_unit is not None and angle_unit.same_kind(RADIAN)
-        rad = angle_unit.factor if angle_unit is not None else 1.0  # of one unit of the angle
-        cycle = 2.0 * np.pi / rad if turns else max(reach, 1e-9)
-
-        def waves(s: Signals, p: Shape) -> list[Array]:
-            angle = 2.0 * np.pi * p["periods"] * s["angle"] / cycle
-            return [np.cos(angle), np.sin(angle)]
-
-        def slow(s: Signals, p: Shape) -> list[Array]:
-            return [s["direction"] * np.exp(-((s["rate"] / p["speed"]) ** 2))]
-
-        joint = self.angle or self.rate
-        found = [
-            self._effect("viscous_friction", joint, ("size",), lambda s, _: [s["rate"]]),
-            self._effect("coulomb_friction", joint, ("size",), lambda s, _: [s["direction"]]),
-            self._effect(
-                "drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square", forms=3
-            ),
-            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] ** 3], form="cube", forms=3),
-            self._effect(
-                "drag",
-                joint,
-                ("size",),
-                lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))],
-                form="root",
-                forms=3,
-            ),
-            self._effect("stribeck", joint, ("excess",), slow, [{"speed": share * top} for share in SPEEDS]),
-            self._effect("direction_friction", joint, ("size",), lambda s, _: [np.abs(s["rate"])]),
-            self._load_friction(joint),
-            self._effect("spring", joint, ("size",), lambda s, _: [s["angle"]]),
-            self._effect("once_per_turn", joint, ("cosine", "sine"), waves, [{"periods": n} for n in PERIODS]),
-        ]
-        if turns:
-            found.append(
-                self._effect(
-                    "gravity",
-                    joint,
-                    ("cosine", "sine"),
-                    lambda s, _: [np.cos(rad * s["angle"]), np.sin(rad * s["angle"])],
-                )
-            )
-        return found
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """Candidates of the response's sensor, of every input, of the joint, of the parameters, and its own."""
+        return balance_candidates.candidates(self, recordings)
 
 
 def _bent(table: Table, column: Array) -> Array:
@@ -290,7 +156,3 @@ def _alike(one: Array, other: Array) -> float:
     """Correlation of two columns without a mean, 0 where one of them is nothing."""
     sizes = math.sqrt(float(one @ one) * float(other @ other))
     return float(one @ other) / sizes if sizes > 0.0 else 0.0
-
-
-def _top(rate: Array) -> float:
-    return max(float(np.quantile(np.abs(rate), 0.98)), 1e-12)

@@ -114,6 +114,9 @@ def _may_be_once(found: Diagnosis, effects: Sequence[Effect]) -> bool:
     if found.doubtful or any(each.effect.cause in DRIFTS for each in found.named):
         return True
     left = found.extended
+    if not any(each.entries for each in found.recordings):  # what lasting causes leave of a jump has a long memory
+        known = likelihood.noise_of(found.recordings, effects, found.skews)
+        left = naming.refit(Regression(found.recordings, noise=known), [*found.skews, *found.named])
     ranked = likelihood.ranking(naming.trials([each for each in effects if each.once], left), left.size)
     ranked = likelihood.in_time(ranked, left)
     return bool(ranked) and ranked[0][0] > max(SURELY_ONCE, LITTLE * left.chi2)
@@ -121,14 +124,21 @@ def _may_be_once(found: Diagnosis, effects: Sequence[Effect]) -> bool:
 
 def _was_once(other: Diagnosis, lasting: Diagnosis) -> bool:
     """True where causes of which one happened once explain surely more than the lasting ones, or any explain it where
-    these alone do not."""
+    these alone do not.
+
+    A drift that held-out data refuse is among the lasting ones: they do not judge a jump that explains no more.
+    """
     if other.doubtful or not other.named:
         return False
     if lasting.doubtful:
         return True
-    return (
-        any(each.effect.once for each in other.named) and _size(lasting.extended) - _size(other.extended) > SURELY_ONCE
-    )
+    drifts = [each for each in lasting.refused if each.effect.cause in DRIFTS]
+    named = [
+        *lasting.named,
+        *(each for each in drifts if not any(each.effect.excludes(one.effect) for one in lasting.named)),
+    ]
+    explained = naming.refit(lasting.plain, named, [*lasting.skews, *named])
+    return any(each.effect.once for each in other.named) and _size(explained) - _size(other.extended) > SURELY_ONCE
 
 
 def _size(regression: Regression) -> float:
@@ -149,17 +159,20 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
     if any(each.entries for each in recordings):
         own_model.determined(machine, bands.plain(recordings))  # before anything is concluded
     skews = list(had)
+    unreal: set[str] = set()  # names of causes that no machine has as they came out
     simulations = rivals.Simulations(machine, had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
-        found = once(recordings, held, begin)
-        while stamps := _stamps(found):
-            skews.extend(stamps)
+        while True:
             found = once(recordings, held, begin)
-        return found
+            stamps, wrong = _stamps(found), _unreal(found)
+            if not stamps and not wrong:
+                return found
+            skews.extend(stamps)
+            unreal.update(wrong)
 
     def once(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
-        rest = _others(effects, skews)
+        rest = [each for each in _others(effects, skews) if each.name not in unreal]
         base = naming.refit(bands.plain(recordings), skews)
         judge = Held(held, skews, base.values) if held else None
         found = likelihood.select(
@@ -472,7 +485,24 @@ def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple
 
 
 def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
-    return [each for each in effects if all(each is not skew.effect for skew in skews)]
+    """The effects without those that are in the base; without other forms of an exact one, a lag, as well."""
+    return [
+        each
+        for each in effects
+        if all(each is not skew.effect and not (each.equals and each.excludes(skew.effect)) for skew in skews)
+    ]
+
+
+def _unreal(found: likelihood.Selection) -> list[str]:
+    """Names of the causes that no machine has with the values that they have at last."""
+    values = found.with_named.values
+    return [
+        each.effect.name
+        for each in found.named
+        if not each.effect.real(
+            {name: values[full] for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)}
+        )
+    ]
 
 
 def _stamps(found: likelihood.Selection) -> list[Named]:

@@ -10,12 +10,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ranger_sim.sysid.machine import Effect
-from ranger_sim.sysid.naming import Named, possible, trials
+from ranger_sim.sysid.naming import Named, inexact, possible, trials
 from ranger_sim.sysid.regression import Regression
 
 CHI2 = 3.84  # 95 % of one degree of freedom
 Z95 = 1.96  # standard errors on each side of a 95 % interval
 ROUNDS = 4  # of finer steps, each a seventh of the one before: an eighth of 6000 rows comes down to a row
+WORTH = 1.0  # chi-square: a round of finer steps that gains less was the last one
 BETWEEN = 6  # shapes between two neighbours of the grid, where a shape is on a scale
 
 Intervals = dict[str, tuple[float, float]]
@@ -23,18 +24,16 @@ Intervals = dict[str, tuple[float, float]]
 
 def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Intervals]:
     """(best shape, interval of every coefficient and shape by name). base: the regression with all but this effect."""
-    found = []
-    for trial in trials([each.effect], base, _shapes(each)):
-        inverse = np.linalg.pinv(trial.gram, rcond=1e-12)
-        values = inverse @ trial.product
-        chi2 = float(values @ trial.product) / trial.inflation
-        numbers = dict(zip(each.effect.coefficients, (float(value) for value in values), strict=True))
-        if each.effect.admissible({**numbers, **trial.shape}):
-            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0) * trial.inflation)
-            found.append((chi2, trial.shape, numbers, dict(zip(numbers, spread, strict=True))))
+    found = _profiled(each.effect, _shapes(each), base)
     if not found:
         return each.shape, {}
     best = max(found, key=lambda one: one[0])
+    for _ in range(ROUNDS - 1):  # until the best shape's neighbours are nearly as likely
+        if _even(best, found, each.effect.scale):
+            break
+        near = [*_between(each.effect, best[1], [shape for _, shape, _, _ in found]), *_itself(each.effect, *best[1:3])]
+        found += _profiled(each.effect, near, base)
+        best = max(found, key=lambda one: one[0])
     intervals: Intervals = {}
     for chi2, shape, numbers, deviations in found:
         left = CHI2 - (best[0] - chi2)
@@ -48,6 +47,45 @@ def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Interva
     return best[1], {name: _to_neighbours(name, ends, found) for name, ends in intervals.items()}
 
 
+Profiled = tuple[float, Mapping[str, float], dict[str, float], dict[str, float]]  # chi2, shape, values, deviations
+
+
+def _profiled(
+    effect: Effect, shapes: Sequence[Mapping[str, float]], base: Regression, within_noise: bool = False
+) -> list[Profiled]:
+    """What an effect explains at each of these shapes, where a machine can have the values, or values within the noise
+    of them."""
+    found = []
+    for trial in trials([effect], base, shapes):
+        inverse = np.linalg.pinv(trial.gram, rcond=1e-12)
+        values = inverse @ trial.product
+        chi2 = float(values @ trial.product) / trial.inflation
+        numbers = dict(zip(effect.coefficients, (float(value) for value in values), strict=True))
+        if possible(trial) if within_noise else effect.admissible({**numbers, **trial.shape}):
+            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0) * trial.inflation)
+            deviations = dict(zip(numbers, (float(each) for each in spread), strict=True))
+            found.append((chi2 - inexact(trial), trial.shape, numbers, deviations))
+    return found
+
+
+def _itself(effect: Effect, shape: Mapping[str, float], numbers: Mapping[str, float]) -> list[Mapping[str, float]]:
+    """The shape that an exact effect's coefficient comes out as."""
+    if effect.equals is None or not numbers[effect.coefficients[0]] > min(
+        each[effect.equals] for each in effect.shapes
+    ):
+        return []
+    return [{**shape, effect.equals: numbers[effect.coefficients[0]]}]
+
+
+def _even(best: Profiled, found: Sequence[Profiled], scale: str | None) -> bool:
+    """True where the best shape's neighbours on both sides explain nearly as much: the interval ends among them."""
+    if scale is None:
+        return True
+    ordered = sorted(found, key=lambda one: one[1][scale])
+    place = next(number for number, one in enumerate(ordered) if one is best)
+    return all(best[0] - one[0] < CHI2 for one in ordered[max(0, place - 1) : place + 2])
+
+
 def whole(each: Named, regression: Regression, profiled: Intervals) -> Intervals:
     """The 95 % interval of every coefficient and shape of a named effect: its profile, and no less than 1.96 standard
     errors in the regression with all named effects, where these depend on each other."""
@@ -59,6 +97,10 @@ def whole(each: Named, regression: Regression, profiled: Intervals) -> Intervals
         found[name] = (value - reach, value + reach)
     for name, ends in profiled.items():
         _widen(found, name, *ends)
+    size, shape = each.effect.coefficients[0], each.effect.equals
+    if shape is not None and each.shape[shape] > min(one[shape] for one in each.effect.shapes):  # one number
+        for one, other in ((size, shape), (shape, size)):
+            _widen(found, one, *found[other])
     return found
 
 
@@ -93,14 +135,19 @@ def _shapes(each: Named) -> list[Mapping[str, float]]:
 def finest(effect: Effect, shape: Mapping[str, float], base: Regression) -> Mapping[str, float]:
     """The likeliest shape about this one of the grid; in finer and finer steps for what happens at one time, of which a
     row may be most. base: without the effect."""
-    tried = list(effect.shapes)
-    for _ in range(0 if effect.scale is None else ROUNDS if effect.once else 1):
-        near = [shape, *_between(effect, shape, tried)]
-        scored = [(float(each.product @ np.linalg.pinv(each.gram, rcond=1e-12) @ each.product) / each.inflation, each)
-                  for each in trials([effect], base, near) if possible(each)]  # fmt: skip
-        if scored:
-            shape = max(scored, key=lambda one: one[0])[1].shape
+    tried, before = list(effect.shapes), 0.0
+    more: list[Mapping[str, float]] = []
+    for _ in range(0 if effect.scale is None else ROUNDS):
+        near = [shape, *_between(effect, shape, tried), *more]
+        found = _profiled(effect, near, base, within_noise=True)
         tried += near
+        if not found:
+            break
+        before = next((one[0] for one in found if one[1] is shape), before)
+        chi2, shape, numbers, _ = max(found, key=lambda one: one[0])
+        if not effect.once and chi2 - before < WORTH:
+            break
+        more = _itself(effect, shape, numbers)
     return shape
 
 

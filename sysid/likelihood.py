@@ -25,7 +25,9 @@ LEVEL = 0.02  # chance that the best of all candidates exceeds its threshold on 
 MOST = 5  # causes
 LEAST = 6.0  # score that a cause must have whatever the surrogates say: that of a tie
 BLOCKS = 8  # of the cross-validation within the training data
-SURE = 2.33  # standard errors over the blocks by which a further effect must exceed a simpler one: 1 % on one side
+# Standard errors over the blocks by which a further effect must exceed a simpler one: 1 % on one side of Student's t,
+# since the error is that of as many blocks
+SURE = 3.0
 PASSES = 3  # over the causes, each held against all others
 WORSE = 1.05  # times the held-out square: an exchange may not make it worse
 ALIKE, MOST_ALIKE = (
@@ -33,6 +35,10 @@ ALIKE, MOST_ALIKE = (
     4,
 )  # of the best score, and how many: causes between which other data choose; the first is found alone
 HIDDEN = 1e-4  # of a candidate's square: when the others explain all but this, an equation does not show it
+# Of what the others leave: a lag that takes less of it is taken at first order for the noise, since a filter's memory
+# takes a part of the noise's. Chosen by us
+MOST_OF_IT = 0.5
+SAME = 1e-9  # of a cosine from 1: columns that are one
 FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
 
 
@@ -65,7 +71,7 @@ class Selection:
 def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: Sequence[Named]) -> Noise:
     """Noise that base, `fixed` effects and all candidates leave together; each candidate at its best shape."""
     base = naming.refit(plain(recordings), fixed)
-    candidates = [_columns(effect, base) for effect in effects]
+    candidates = [_columns(effect, base) for effect in _with_time(effects, base)]
     found: dict[str, Whitening] = {}
     white: dict[str, Array] = {}
     for name, part in base.parts.items():
@@ -74,19 +80,21 @@ def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: 
         basis = np.linalg.qr(_scaled(z[good]))[0]
         left = y[good] - x[good] @ np.array([base.values[each] for each in base.names])
         left -= basis @ (basis.T @ left)
-        added: list[tuple[float, Array]] = []
-        for shapes in candidates:
-            tried = [(_gain(each[name][good], basis, left), each[name]) for each in shapes if name in each]
-            if tried:
-                added.append(max(tried, key=lambda one: one[0]))
-        added.sort(key=lambda one: -one[0])
         most = np.count_nonzero(good) // FEWEST_FREE - x.shape[1]
         kept: list[Array] = []
-        for _, columns in added:
-            new = _seen(columns, good, basis)
-            if sum(each.shape[1] for each in kept) + new.shape[1] <= most:
-                kept.append(new)
-                basis = np.linalg.qr(np.hstack([basis, new[good]]))[0]
+        for exact in (False, True):  # a lag last: of a large one every other candidate is a part
+            left = left - basis @ (basis.T @ left)
+            added: list[tuple[float, Array]] = []
+            for effect, shapes in zip(effects, candidates, strict=True):
+                tried = [(_gain(each[name][good], basis, left), each[name]) for each in shapes if name in each]
+                if tried and (effect.equals is not None) == exact:
+                    best = max(tried, key=lambda one: one[0])
+                    added.append(tried[0] if exact and best[0] < MOST_OF_IT * float(left @ left) else best)
+            for _, columns in sorted(added, key=lambda one: -one[0]):
+                new = _seen(columns, good, basis)
+                if sum(each.shape[1] for each in kept) + new.shape[1] <= most:
+                    kept.append(new)
+                    basis = np.linalg.qr(np.hstack([basis, new[good]]))[0]
         wide = np.hstack([x, *kept])
         residual = y - wide @ fitted(np.hstack([z, *kept])[good], wide[good], y[good])
         memory = noise.autoregression(residual, good & _unbroken(part))
@@ -137,6 +145,22 @@ def _gain(columns: Array, basis: Array, left: Array) -> float:
     """Square that columns explain of what the base left."""
     off = columns - basis @ (basis.T @ columns)
     return float(left @ left - np.sum((left - off @ least_squares(off, left)) ** 2))
+
+
+def _with_time(effects: Sequence[Effect], base: Regression) -> list[Effect]:
+    """The effects of a balance, the likeliest that happens once with its own time as well.
+
+    At the grid's times a large jump leaves a stretch of itself, which would be noise with a long memory.
+    """
+    once = [] if any(each.entries for each in base.recordings) else [each for each in effects if each.once]
+    ranked = ranking(naming.trials(once, base), base.size)
+    if not ranked:
+        return list(effects)
+    first = ranked[0][3]
+    shape = intervals.finest(first.effect, first.shape, base)
+    return [
+        dataclasses.replace(each, shapes=[*each.shapes, shape]) if each is first.effect else each for each in effects
+    ]
 
 
 def _columns(effect: Effect, base: Regression) -> list[dict[str, Array]]:
@@ -240,7 +264,9 @@ def select(
     while True:
         if not tried:  # first, and with a cause in the base
             progress(len(named) / most)
-            tried = [each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN]
+            tried = [
+                each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN and _new(each, regression)
+            ]
             scores = by_chance(tried, regression, surrogates(regression, seed))
         kept = np.array([any(each.effect is effect for effect in rest) for each in tried], dtype=bool)
         tried, scores = [each for each, there in zip(tried, kept, strict=True) if there], scores[kept]
@@ -257,7 +283,7 @@ def select(
             )
         near = [each for each in ranked if abs(chosen[0] - each[0]) < naming.TIE and naming.possible(each[3])]
         within = max(naming.TIE, ALIKE * chosen[0])
-        alike = [each for each in ranked if chosen[0] - each[0] < within and naming.possible(each[3])][:MOST_ALIKE]
+        alike = _alike([each for each in ranked if chosen[0] - each[0] < within and naming.possible(each[3])])
         options = [_named(_finest(each, regression), ranked, near, chance) for each in alike]
         options.sort(key=lambda each: -each.bic)
         extensions = [naming.refit(base, [*named, each], [*fixed, *named, each]) for each in options]
@@ -421,6 +447,12 @@ def _exchanged(
 Scored = tuple[float, float, int, Trial]  # (score, chi-square, freedom, trial)
 
 
+def _alike(ranked: Sequence[Scored]) -> list[Scored]:
+    """The best of these, and in addition the best form of a lag, of which a curve is a part and many shapes are it."""
+    exact = [each for each in ranked if each[3].effect.equals is not None][:1]
+    return [*[each for each in ranked if each[3].effect.equals is None][:MOST_ALIKE], *exact]
+
+
 def _named(one: Scored, ranked: Sequence[Scored], near: Sequence[Scored], chance: Array) -> Named:
     """One of the ranking as a named effect. near: those that tie; chance: best scores of surrogates."""
     score, chi2, freedom, trial = one
@@ -458,6 +490,18 @@ def in_time(ranked: Sequence[Scored], regression: Regression) -> list[Scored]:
     return sorted(out, key=lambda each: -each[0])
 
 
+def _new(trial: Trial, regression: Regression) -> bool:
+    """False for a column that a parameter has already; against that one's stand-in it would look like another."""
+    for name, columns in trial.white.items():
+        measured = regression.measured[regression.rows[name]]
+        sizes = np.linalg.norm(measured, axis=0) * np.linalg.norm(columns[:, 0])
+        if columns.shape[1] == 1 and np.any(
+            np.abs(columns[:, 0] @ measured) > (1.0 - SAME) * np.maximum(sizes, 1e-300)
+        ):
+            return False
+    return True
+
+
 def own_part(trial: Trial) -> float:
     """Part of an effect's square that the base does not explain."""
     whole = sum(float(np.sum(columns**2)) for columns in trial.white.values())
@@ -471,7 +515,7 @@ def ranking(tried: Sequence[Trial], size: int) -> list[Scored]:
         chi2, freedom = explained(trial.gram, trial.product)
         if not freedom:
             continue
-        chi2 /= trial.inflation
+        chi2 = chi2 / trial.inflation - naming.inexact(trial)
         found = (float(score(chi2, freedom, trial.effect.choices, size)), chi2, freedom, trial)
         if id(trial.effect) not in best or found[0] > best[id(trial.effect)][0]:
             best[id(trial.effect)] = found

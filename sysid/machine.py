@@ -11,7 +11,7 @@ or more equations: one for each of its coefficients, with shapes (a speed, a num
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -143,6 +143,8 @@ class Recording:
     between_rows: dict[str, str] = dataclasses.field(default_factory=dict)  # by input of a simulator, in words
     left_over: bool = False  # responses are a simulation's errors, not measurements
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
+    # by equation, width and every: weights of the rows in each kept one, as the regression has made them once
+    averages: dict[tuple[str, float, int], Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
 
 
 class NoEquationError(ModelError):
@@ -169,6 +171,9 @@ class Effect:
     form: str = ""  # of several forms of one cause at one place: only one of them is named, the others may be its ties
     forms: int = 1  # of this cause at this place, of which the best is taken: it counts as a shape on a grid does
     scale: str | None = None  # a shape, above 0, that may also lie between the grid's values: it is refined
+    # as `admissible`, of a whole answer: on the way to it a friction of the wrong sign may lead to the right causes
+    real: Callable[[Mapping[str, float]], bool] = lambda found: True
+    equals: str | None = None  # a shape beyond whose smallest value the coefficient is the shape itself, as a lag is
     free: tuple[str, ...] = ()  # coefficients that another run does not share, as the state before it
     once: bool = False  # it happens in one run, at its own time: another run may lack it, and does not judge it
     phase_is_free: bool = (

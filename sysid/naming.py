@@ -162,6 +162,21 @@ def possible(trial: Trial) -> bool:
     )
 
 
+def inexact(trial: Trial) -> float:
+    """Chi-square that an exact effect loses where its coefficient is the shape itself.
+
+    The smallest shape of its grid is one of first order.
+    """
+    effect = trial.effect
+    if effect.equals is None:
+        return 0.0
+    size, shape = float(trial.gram[0, 0]), trial.shape[effect.equals]
+    value = float(trial.product[0]) / max(size, 1e-300)
+    if shape <= min(each[effect.equals] for each in effect.shapes) and value < shape:
+        return 0.0
+    return (value - shape) ** 2 * size / trial.inflation
+
+
 def refit(
     regression: Regression,
     named: Sequence[Named],

@@ -40,6 +40,15 @@ def reduced(recording: Recording, column: Array, equation: str) -> Array:
 
 def _averages(recording: Recording, equation: str) -> tuple[sparse.csr_array, np.ndarray]:
     """(weights of the rows in each kept row, share of the Gaussian that is on rows that count: 0 at a run's end)."""
+    key = equation, recording.width, recording.every
+    if key not in recording.averages:
+        recording.averages[key] = _weights(recording, equation)
+    found: tuple[sparse.csr_array, np.ndarray] = recording.averages[key]
+    return found
+
+
+def _weights(recording: Recording, equation: str) -> tuple[sparse.csr_array, np.ndarray]:
+    """As `_averages`, made anew."""
     made = recording.equations.get(equation)
     counts = np.ones(len(recording.table), dtype=bool) if made is None else made.valid
     reach = int(np.ceil(REACH * recording.width))

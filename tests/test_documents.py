@@ -209,7 +209,5 @@ def test_the_figure_of_the_actuators_lag_is_drawn_from_the_answers_that_are_kept
         if "found_ms" in row:
             low, high = row["ci95_ms"]
             assert row["named"] == "input_lag at current"
-            assert (
-                f"| {row['hidden_ms']} ms | input_lag | {row['found_ms']:.2f} ms ({low:.2f} to {high:.2f}) |" in page
-            )
+            assert f"| {row['hidden_ms']} ms | input_lag | {row['found_ms']:.2f} ms ({low:.2f} to {high:.2f}) |" in page
     assert [row["hidden_ms"] for row in rows if not row["named"]] == [0]

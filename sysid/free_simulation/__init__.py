@@ -27,7 +27,7 @@ A user's machine is a subclass of `SimulatedMachine` (`declared.py`, `terms.py`,
 can have: `candidates.py`); `examples/servo_arm.py` is a complete one.
 """
 
-from ranger_sim.sysid.free_simulation.candidates import filtered
+from ranger_sim.sysid.forms import filtered
 from ranger_sim.sysid.free_simulation.integration import Quantities, held, runge_kutta, standing
 from ranger_sim.sysid.free_simulation.machine import SimulatedMachine
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording

@@ -6,8 +6,8 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.forms import delayed
 from ranger_sim.sysid.free_simulation import Term, filtered, into
-from ranger_sim.sysid.free_simulation.candidates import delayed
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.test_noise_floor import Disc, STEP_s
