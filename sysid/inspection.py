@@ -129,10 +129,6 @@ LOOK_AT = {
         "What filters or delays the signal: the sensor's own filter setting, RC at the ADC, averages in the firmware, "
         "the slot that samples it, the frame that carries it; step the quantity and scope raw against logged."
     ),
-    "input_lag": (
-        "What delays or filters it on its way: the cycle of bus and controller, an inverter's dead time, an actuator's "
-        "inner loop or valve; step the command and scope what arrives against the logged one."
-    ),
     "bit_flip": (
         "The encoder's serial line: clock rate for its length, termination, shield and ground near the motor leads; "
         "use parity or CRC, or read twice and count the differences."

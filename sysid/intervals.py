@@ -28,7 +28,8 @@ def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Interva
     if not found:
         return each.shape, {}
     best = max(found, key=lambda one: one[0])
-    for _ in range(ROUNDS - 1):  # until the best shape's neighbours are nearly as likely
+    # until the best shape's neighbours are nearly as likely; all times between two rows are alike
+    for _ in range(0 if each.effect.once else ROUNDS - 1):
         if _even(best, found, each.effect.scale):
             break
         near = [*_between(each.effect, best[1], [shape for _, shape, _, _ in found]), *_itself(each.effect, *best[1:3])]

@@ -11,7 +11,7 @@ A candidate that the machine's own parameters explain cannot be seen and is not 
 equals is left out.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -51,6 +51,7 @@ class Declares(Protocol):
     outputs: tuple[Output, ...]
     joints: tuple[Joint, ...]
     parameters: tuple[Known, ...]
+    impossible: Collection[str]
 
 
 Signal = Callable[[Mapping[str, Array], Shape], Array]
@@ -59,10 +60,12 @@ Signal = Callable[[Mapping[str, Array], Shape], Array]
 def candidates(machine: Declares, inputs: Sequence[str], recordings: Sequence[Recording]) -> list[Term]:
     """All of them. inputs: names of the simulator's inputs."""
     made: list[Term] = []
+    # a single output shows late inputs as it shows its own lag
+    one_lag = len(machine.outputs) == 1 and "sensor_lag" not in machine.impossible
     for output in machine.outputs:
-        made += at_output(output, recordings)
+        made += at_output(output, recordings, "; or the inputs are late by as much" if one_lag else "")
     for name in inputs:
-        made += at_input(name, recordings)
+        made += [each for each in at_input(name, recordings) if not (one_lag and each.cause == "input_lag")]
     for joint in machine.joints:
         made += at_joint(joint, recordings)
     for known in machine.parameters:
@@ -70,8 +73,8 @@ def candidates(machine: Declares, inputs: Sequence[str], recordings: Sequence[Re
     return made
 
 
-def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
-    """An output's offset, scale, drift and lag."""
+def at_output(output: Output, recordings: Sequence[Recording], or_late: str = "") -> list[Term]:
+    """An output's offset, scale, drift and lag. or_late: what else its lag may be, in words."""
     name, place, unit = output.channel, shown(output.channel), _word(output.unit)
 
     def sensor(cause: str, coefficient: str, make: Callable[[Table, Array], Array], meaning: str) -> Term:
@@ -95,7 +98,7 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
 
         return Term(
             "sensor_lag", name, "sensor", ("lag_s",), make, each.shapes(recordings), each.fits(recordings),
-            meaning=f"{name} {each.words}", independent=True, form=each.form, scale=each.time,
+            meaning=f"{name} {each.words}{or_late}", independent=True, form=each.form, scale=each.time,
         )  # fmt: skip
 
     return [

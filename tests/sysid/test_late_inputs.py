@@ -131,3 +131,25 @@ def test_a_cause_with_which_the_simulator_gives_no_numbers_is_a_finding_without_
     assert result.detected
     (lost,) = (each for each in result.data_findings if each.kind == "runs_away")
     assert "input_lag" in lost.text and lost.text.endswith("the simulation runs away")
+
+
+def _lags(machine):
+    table = swung(13, lambda given: given)
+    recording = machine.prepare(table)
+    return {each.cause: each.term.meaning for each in machine.effects([recording]) if each.cause.endswith("_lag")}
+
+
+class OneOutput(Pendulum):
+    outputs = Pendulum.outputs[:1]
+
+
+class WithoutSensorLag(OneOutput):
+    impossible = ("sensor_lag",)
+
+
+def test_one_output_has_one_lag_which_may_be_of_the_input():
+    assert set(_lags(Pendulum())) == {"sensor_lag", "input_lag"}
+    assert "inputs" not in _lags(Pendulum())["sensor_lag"]
+    one = _lags(OneOutput())
+    assert set(one) == {"sensor_lag"} and one["sensor_lag"].endswith("or the inputs are late by as much")
+    assert set(_lags(WithoutSensorLag())) == {"input_lag"}
