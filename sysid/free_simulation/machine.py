@@ -120,7 +120,7 @@ class SimulatedMachine(DeclaredMachine):
         fit = _fit(recording).acted_on(acting, fixed)
         fit.settle(AGAIN)
         _chosen(fit)
-        return linearised.one_step_ahead(numerical_floor.likelier_held(fit))
+        return linearised.one_step_ahead(fit if fixed else numerical_floor.likelier_held(fit))
 
     def about_all(
         self,
