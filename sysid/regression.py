@@ -413,12 +413,12 @@ class Regression:
             self.rows[name] = slice(start, stop)
             start = stop
         self.both: dict[tuple[str, str], tuple[np.ndarray, np.ndarray]] = {}
-        self.common: dict[tuple[str, str], tuple[slice | np.ndarray, slice | np.ndarray]] = {}
         for one, other in self.shared:
             both = self.good[one] & self.good[other]
-            here, there = np.flatnonzero(both[self.good[one]]), np.flatnonzero(both[self.good[other]])
-            self.both[one, other] = self.rows_of(one).start + here, self.rows_of(other).start + there
-            self.common[one, other] = _unbroken(here), _unbroken(there)
+            self.both[one, other] = (
+                self.rows_of(one).start + np.flatnonzero(both[self.good[one]]),
+                self.rows_of(other).start + np.flatnonzero(both[self.good[other]]),
+            )
         self._solve()
 
     def _priors(self) -> dict[str, tuple[float, float]]:
@@ -503,7 +503,9 @@ class Regression:
                 if name in white:
                     product -= np.sum((white[name].T @ self.facing[pair, name]).T * shadow, axis=0)
             if pair[0] in white and pair[1] in white:
-                here, there = self.common[pair]
+                here, there = (
+                    rows - self.rows_of(name).start for rows, name in zip(self.both[pair], pair, strict=True)
+                )
                 product += np.sum(white[pair[0]][here] * white[pair[1]][there], axis=0)
             worst += 2.0 * abs(correlation) * float(np.max(np.abs(product), initial=0.0)) * len(gram) / total
         return worst
@@ -562,12 +564,6 @@ class Regression:
     def rows_of(self, equation: str) -> slice:
         """Slice of an equation in the stacked rows."""
         return self.rows[equation]
-
-
-def _unbroken(rows: np.ndarray) -> slice | np.ndarray:
-    """Numbers of rows as a slice where they are one after the other: what it takes is not copied."""
-    first, last = (int(rows[0]), int(rows[-1])) if len(rows) else (0, -1)
-    return slice(first, last + 1) if last + 1 - first == len(rows) else rows
 
 
 def innovations(coefficients: Array, column: Array) -> Array:

@@ -1,6 +1,5 @@
 """The Kalman predictor and smoother of a simulator that was linearised about a trajectory."""
 
-import contextlib
 import dataclasses
 from collections.abc import Collection, Mapping
 
@@ -77,24 +76,19 @@ class Predictor:
         begin = np.any(begins, axis=1).tolist()
         C_turned = np.ascontiguousarray(C_all.swapaxes(2, 3))
         covariance, gain, spread = (np.empty((length, len(P), *shape)) for shape in ((s, s), (s, o), (o, o)))
-        shared = bool(np.any(both_noise))  # a noisy input that outputs show at once
-        # of a machine that runs away; its likelihood is judged as no number
-        with np.errstate(divide="ignore") if o == 2 else contextlib.nullcontext():
-            for k in range(length):
-                if begin[k]:
-                    P[begins[k]] = free
-                A, C, R = A_all[k], C_all[k], R_all[k]
-                PC = P @ C_turned[k]
-                error = C @ PC + R
-                K = _divided(A @ PC + S_all[k] if shared else A @ PC, error)
-                covariance[k], gain[k], spread[k] = P, K, error
-                # Joseph's form: a sum of squares, which stays positive where the sensors' noise is next to nothing
-                inner, K_turned = A - K @ C, K.swapaxes(1, 2)
-                P = inner @ P @ inner.swapaxes(1, 2) + K @ R @ K_turned + Q_all[k]
-                if shared:
-                    less = S_all[k] @ K_turned
-                    P = P - less - less.swapaxes(1, 2)
-                P = 0.5 * (P + P.swapaxes(1, 2))
+        for k in range(length):
+            if begin[k]:
+                P[begins[k]] = free
+            A, C, S = A_all[k], C_all[k], S_all[k]
+            PC = P @ C_turned[k]
+            error = C @ PC + R_all[k]
+            K = _divided(A @ PC + S, error)
+            covariance[k], gain[k], spread[k] = P, K, error
+            # Joseph's form: a sum of squares, which stays positive where the sensors' noise is next to nothing
+            inner, K_turned = A - K @ C, K.swapaxes(1, 2)
+            less = S @ K_turned
+            P = inner @ P @ inner.swapaxes(1, 2) + K @ R_all[k] @ K_turned + Q_all[k] - less - less.swapaxes(1, 2)
+            P = 0.5 * (P + P.swapaxes(1, 2))
         self.ends: Array = P  # (stretches, s, s) covariances at the end of each stretch
         self.covariance, self.gain = in_turn(covariance), in_turn(gain)
         self.spread = in_turn(spread)  # Cholesky factor of the prediction error's covariance
@@ -180,7 +174,8 @@ def _divided(a: Array, by: Array) -> Array:
         return np.asarray(a / by)
     if by.shape[1] == 2:
         one, both, two = by[:, :1, 0], by[:, :1, 1], by[:, 1:, 1]
-        share = 1.0 / (one * two - both * both)
+        with np.errstate(divide="ignore"):  # of a machine that runs away; its likelihood is judged as no number
+            share = 1.0 / (one * two - both * both)
         out = np.empty_like(a)
         out[:, :, 0] = (a[:, :, 0] * two - a[:, :, 1] * both) * share
         out[:, :, 1] = (a[:, :, 1] * one - a[:, :, 0] * both) * share
