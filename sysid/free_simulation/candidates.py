@@ -223,7 +223,7 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
                 friction,
                 f"friction grows with the load, share * |{joint.load}|",
                 admissible=lambda found: found["share"] > 0.0,
-            )  # fmt: skip
+            )
         )
     if joint.position:
         periods = [{"periods": float(each)} for each in joint.periods]
