@@ -34,8 +34,8 @@ ALONE = $(filter tests/tools/panel/% tests/test_watched.py,$(WITH_A_CLOCK))
 PAGES = tests/pages
 
 test: $(VENV)/.all
-	$(PYTEST) -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways and not blind" $(addprefix --ignore=,$(ALONE) $(PAGES))
-	$(PYTEST) -rs $(ALONE)
+	$(PYTEST) -rsfE -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways and not blind" $(addprefix --ignore=,$(ALONE) $(PAGES))
+	$(PYTEST) -rsfE $(ALONE)
 
 # The packages' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
 # minutes so, programs that keep a pace, and what compares both modes already.
@@ -45,8 +45,8 @@ NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_201
 	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/walking/test_walking.py)
 
 test-interpreted: $(VENV)/.all
-	RANGER_SIM_INTERPRETED=1 $(PYTEST) -rs -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
-	$(PYTEST) -rs -n 2 -m both_ways tests/system/test_determinism.py
+	RANGER_SIM_INTERPRETED=1 $(PYTEST) -rsfE -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
+	$(PYTEST) -rsfE -n 2 -m both_ways tests/system/test_determinism.py
 
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site
@@ -55,7 +55,7 @@ docs: $(VENV)/.all
 	@echo "build/site/docs/index.html"
 
 test-blind: $(VENV)/.all
-	$(PYTEST) -rs -m blind tests/blind
+	$(PYTEST) -rsfE -m blind tests/blind
 
 test-suites: $(VENV)/.all
 	$(RUN) -m dev.suites

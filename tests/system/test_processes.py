@@ -124,13 +124,21 @@ class Up:
         self.started.stdout.close()
 
 
-def unused(names):
-    """Of these names of shared memory, those that no process has: other tests side by side have some while they run."""
-    mapped = set()
-    for entry in pathlib.Path("/proc").glob("[0-9]*/maps") if names else ():
-        with contextlib.suppress(OSError):
-            mapped.update(re.findall(r"/dev/shm/(\S+)", entry.read_text()))
-    return names - mapped
+def until_used_or_gone(names):
+    """Wait until each of these names of shared memory is gone, or some process has it.
+
+    Tests side by side have names, too: a semaphore or a browser's buffer has one for a moment before it is mapped.
+    """
+    end = wallclock.monotonic_s() + PATIENCE_S
+    while names := names & set(os.listdir("/dev/shm")):
+        mapped = set()
+        for entry in pathlib.Path("/proc").glob("[0-9]*/maps"):
+            with contextlib.suppress(OSError):
+                mapped.update(re.findall(r"/dev/shm/(\S+)", entry.read_text()))
+        if not (names := names - mapped):
+            return
+        assert wallclock.monotonic_s() < end, f"still in /dev/shm: {sorted(names)}"
+        wallclock.sleep_s(0.02)
 
 
 @pytest.fixture
@@ -145,7 +153,7 @@ def up():
     yield start
     for each in started:
         each.close()
-    assert not unused(set(os.listdir("/dev/shm")) - shared_memory)
+    until_used_or_gone(set(os.listdir("/dev/shm")) - shared_memory)
 
 
 def summary_of(text):
