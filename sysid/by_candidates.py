@@ -41,7 +41,9 @@ MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likel
 # Of the likeliest one's score: what explains less hardly moves where the simulator ends. Chosen by us
 SMALL = 0.2
 FEW_SHAPES = 9  # of a candidate that acts at all of them while a simulator is lost: jumps have 9, lags more
-AGAIN = 3  # simulations with the named effects, at most
+# Simulations with the named effects, at most, and where only the size of a named lag still moves: it goes to and fro
+# about its place
+AGAIN, LAG_AGAIN = 3, 8
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 # Times what numerics move it by: a named effect is at least so large. A lag is a stamp's, up to half a row, in one of
 # the ways in which an input may go between its rows where it is below twice of the half row between these
@@ -124,7 +126,7 @@ def _may_be_once(found: Diagnosis, effects: Sequence[Effect]) -> bool:
 
 def _was_once(other: Diagnosis, lasting: Diagnosis) -> bool:
     """True where causes of which one happened once explain surely more than the lasting ones, or any explain it where
-    these alone do not.
+    these alone do not: a simulator may be lost without what happened once among its candidates.
 
     A drift that held-out data refuse is among the lasting ones: they do not judge a jump that explains no more.
     """
@@ -138,7 +140,8 @@ def _was_once(other: Diagnosis, lasting: Diagnosis) -> bool:
         *(each for each in drifts if not any(each.effect.excludes(one.effect) for one in lasting.named)),
     ]
     explained = naming.refit(lasting.plain, named, [*lasting.skews, *named])
-    return any(each.effect.once for each in other.named) and _size(explained) - _size(other.extended) > SURELY_ONCE
+    once = any(each.effect.once for each in other.named)
+    return (once or not lasting.named) and _size(explained) - _size(other.extended) > SURELY_ONCE
 
 
 def _size(regression: Regression) -> float:
@@ -185,18 +188,20 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
     floor: dict[str, tuple[float, ...]] = {}
     small: list[str] = []
     lost: list[Finding] = []
-    for number in range(AGAIN if found.named and hasattr(machine, "again") else 0):
-        progress("simulated again", 0.5 + 0.2 * number / AGAIN)
+    for number in range(LAG_AGAIN if found.named and hasattr(machine, "again") else 0):
+        progress("simulated again", 0.5 + 0.2 * min(1.0, number / AGAIN))
         previous = found
         effects = _finer(effects, found, skews)
         linearised = [*recordings, *held]
         recordings, held, lost = _simulated_again(simulations, recordings, held, found)
         if all(new is old for new, old in zip([*recordings, *held], linearised, strict=True)):
             break
-        found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
-        if [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]:
-            if all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):
-                break
+        found = selected(recordings, held, 0.5 + 0.2 * min(1.0, number / AGAIN))
+        same = [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]
+        if same and all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):
+            break
+        if number + 1 >= AGAIN and not (same and any(each.effect.cause in LAGS for each in found.named)):
+            break
     while found.named and hasattr(machine, "numerical"):  # what is named instead of a small effect may be small as well
         progress("numerics", 0.7)
         recordings, held, lost = _simulated_again(simulations, recordings, held, found)  # where causes are judged
@@ -309,7 +314,8 @@ def _sure_names(
         for each in found.named:
             others = [other for other in found.named if other is not each]
             base = naming.refit(found.base, others, [*fixed, *others]) if others else found.base
-            each.shape, profiles[each.effect.name] = intervals.profile(each, base)
+            each.shape, profile = intervals.profile(each, base)
+            profiles[each.effect.name] = _with_numerics(each, profile, floor)
         extended = naming.refit(found.base, found.named, [*fixed, *found.named])
         _widen(extended)
         _add_numerics(extended, found.named, floor)
@@ -624,6 +630,17 @@ def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping
             number = regression.names.index(name)
             error = math.sqrt(max(0.0, float(regression.covariance[number, number])))
             regression.covariance[number, number] = (error + moved / intervals.Z95) ** 2
+
+
+def _with_numerics(
+    each: Named, profile: intervals.Intervals, floor: Mapping[str, tuple[float, ...]]
+) -> intervals.Intervals:
+    """The profile, in which a lag's shape has the same part of numerics as its size: both are one number."""
+    name = each.effect.scale
+    if each.effect.cause not in LAGS or name not in profile or each.effect.name not in floor:
+        return profile
+    (low, high), moved = profile[name], floor[each.effect.name][0]
+    return {**profile, name: (max(0.0, low - moved), high + moved)}
 
 
 def smallest(effects: Sequence[Effect], regression: Regression, threshold: float) -> list[Visible]:

@@ -17,6 +17,9 @@ from ranger_sim.sysid.machine import Recording
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, but for the shortest
+# What was there before a run: of a delay at most so many numbers, and of all runs together
+MOST_BEFORE, MOST_BEFORE_RUNS = 8, 40
+ROUNDED = 1e-6  # of a delay: a row that is so much less after a start is after it
 MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording
 JUMPED = (0.03, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 0.97)  # of the longest recording: when something jumps
 SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
@@ -27,11 +30,13 @@ Shape = Mapping[str, float]
 @dataclasses.dataclass(frozen=True)
 class Lag:
     """A form of a sensor's lag. time: name of its shape; late(table, columns, lag_s): columns (n,) or (n, k) behind it;
-    reaches: times the lag that what it shows depends on; words: after a sensor's name."""
+    remembered(since_s, lag_s): (rows, m) what each of m numbers from before a run adds since its start; reaches: times
+    the lag that what it shows depends on; words: after a sensor's name."""
 
     form: str
     time: str
     late: Callable[[Table, Array, float], Array]
+    remembered: Callable[[Array, float], Array]
     reaches: float
     words: str
 
@@ -46,6 +51,17 @@ class Lag:
             return found[self.time] <= shortest or 1.0 / NEAR < found["lag_s"] / found[self.time] < NEAR
 
         return near
+
+    def before(self, table: Table, column: Array, late: Array, lag_s: float) -> Array:
+        """(n, m) what was there before each run may add to `late`, each column with a deviation of 1: as much as the
+        column (n,) usually changes by the lag."""
+        found = []
+        for run in table.runs[:MOST_BEFORE_RUNS]:
+            remembered = self.remembered(table.time_s[run] - table.time_s[run][0], lag_s)
+            columns = np.zeros((len(table), min(remembered.shape[1], MOST_BEFORE_RUNS // len(table.runs) or 1)))
+            columns[run] = remembered[:, : columns.shape[1]]
+            found.append(columns)
+        return np.hstack(found) * np.sqrt(np.mean((late - column) ** 2))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,6 +111,22 @@ def filtered(table: Table, column: Array, lag_s: float) -> Array:
     return out
 
 
+def _of_a_delay(since_s: Array, lag_s: float) -> Array:
+    """Values of each row that shows what was before the start, or of some with straight lines in between; the less
+    unlike the first value, the nearer to it."""
+    rows = int(np.count_nonzero(lag_s - since_s > ROUNDED * lag_s))
+    knots = np.linspace(0.0, rows - 1.0, min(rows, MOST_BEFORE))
+    hats = [np.interp(np.arange(rows), knots, one) for one in np.eye(len(knots))]
+    out = np.zeros((len(since_s), len(knots)))
+    out[:rows] = np.column_stack(hats) * np.sqrt(1.0 - since_s[:rows, None] / lag_s)
+    return out
+
+
+def _of_a_filter(since_s: Array, lag_s: float) -> Array:
+    """The filter's value, which is forgotten with its time constant."""
+    return np.exp(-since_s[:, None] / lag_s)
+
+
 def jumped(elapsed_s: Array, shape: Shape) -> Array:
     """(n,) 0 before the jump and 1 from it on."""
     return np.where(elapsed_s < shape["at_s"], 0.0, 1.0)
@@ -114,9 +146,9 @@ def settlings(recordings: Sequence[Recording]) -> list[Shape]:
     return [{"tau_s": share * longest_s(recordings)} for share in SETTLED]
 
 
-DELAY = Lag("delay", "delay_s", delayed, 1.2, "is late: it shows the true value of lag_s before")
+DELAY = Lag("delay", "delay_s", delayed, _of_a_delay, 1.2, "is late: it shows the true value of lag_s before")
 FILTER = Lag(
-    "filter", "time_constant_s", filtered, 5.0,
+    "filter", "time_constant_s", filtered, _of_a_filter, 5.0,
     "lags: it shows the true value behind a low-pass of first order with the time constant lag_s",
 )  # fmt: skip
 LAGS = (DELAY, FILTER)

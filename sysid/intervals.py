@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ranger_sim.sysid.machine import Effect
-from ranger_sim.sysid.naming import Named, inexact, possible, trials
+from ranger_sim.sysid.naming import Named, by_shapes, inexact, possible, trials
 from ranger_sim.sysid.regression import Regression
 
 CHI2 = 3.84  # 95 % of one degree of freedom
@@ -24,7 +24,7 @@ Intervals = dict[str, tuple[float, float]]
 
 def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Intervals]:
     """(best shape, interval of every coefficient and shape by name). base: the regression with all but this effect."""
-    found = _profiled(each.effect, _shapes(each), base)
+    found = _alike(_profiled(each.effect, _shapes(each), base))
     if not found:
         return each.shape, {}
     best = max(found, key=lambda one: one[0])
@@ -32,11 +32,11 @@ def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Interva
     for _ in range(0 if each.effect.once else ROUNDS - 1):
         if _even(best, found, each.effect.scale):
             break
-        near = [*_between(each.effect, best[1], [shape for _, shape, _, _ in found]), *_itself(each.effect, *best[1:3])]
-        found += _profiled(each.effect, near, base)
+        near = [*_between(each.effect, best[1], [one[1] for one in found]), *_itself(each.effect, *best[1:3])]
+        found = _alike([*found, *_profiled(each.effect, near, base)])
         best = max(found, key=lambda one: one[0])
     intervals: Intervals = {}
-    for chi2, shape, numbers, deviations in found:
+    for chi2, shape, numbers, deviations, _, _ in found:
         left = CHI2 - (best[0] - chi2)
         if left < 0.0:
             continue
@@ -48,7 +48,16 @@ def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Interva
     return best[1], {name: _to_neighbours(name, ends, found) for name, ends in intervals.items()}
 
 
-Profiled = tuple[float, Mapping[str, float], dict[str, float], dict[str, float]]  # chi2, shape, values, deviations
+# Chi-square among `_alike`, shape, values, deviations, gain and inflation
+Profiled = tuple[float, Mapping[str, float], dict[str, float], dict[str, float], float, float]
+
+
+def _alike(found: Sequence[Profiled]) -> list[Profiled]:
+    """The same with chi-squares that can be compared (`by_shapes`)."""
+    if not found:
+        return []
+    chi2s = by_shapes([one[4] for one in found], [one[5] for one in found])
+    return [(chi2, *one[1:]) for chi2, one in zip(chi2s, found, strict=True)]
 
 
 def _profiled(
@@ -60,12 +69,12 @@ def _profiled(
     for trial in trials([effect], base, shapes):
         inverse = np.linalg.pinv(trial.gram, rcond=1e-12)
         values = inverse @ trial.product
-        chi2 = float(values @ trial.product) / trial.inflation
+        gain = float(values @ trial.product) - inexact(trial)
         numbers = dict(zip(effect.coefficients, (float(value) for value in values), strict=True))
         if possible(trial) if within_noise else effect.admissible({**numbers, **trial.shape}):
             spread = np.sqrt(np.maximum(np.diag(inverse), 0.0) * trial.inflation)
             deviations = dict(zip(numbers, (float(each) for each in spread), strict=True))
-            found.append((chi2 - inexact(trial), trial.shape, numbers, deviations))
+            found.append((gain / trial.inflation, trial.shape, numbers, deviations, gain, trial.inflation))
     return found
 
 
@@ -120,7 +129,7 @@ def _to_neighbours(name: str, ends: tuple[float, float], found: list) -> tuple[f
     """A shape is known no better than to the middle of the next that was tried."""
     if name not in found[0][1]:
         return ends
-    tried = sorted({shape[name] for _, shape, _, _ in found})
+    tried = sorted({one[1][name] for one in found})
     low, high = tried.index(ends[0]), tried.index(ends[1])
     return (
         0.5 * (tried[low] + tried[low - 1]) if low else ends[0],
@@ -140,12 +149,12 @@ def finest(effect: Effect, shape: Mapping[str, float], base: Regression) -> Mapp
     more: list[Mapping[str, float]] = []
     for _ in range(0 if effect.scale is None else ROUNDS):
         near = [shape, *_between(effect, shape, tried), *more]
-        found = _profiled(effect, near, base, within_noise=True)
+        found = _alike(_profiled(effect, near, base, within_noise=True))
         tried += near
         if not found:
             break
         before = next((one[0] for one in found if one[1] is shape), before)
-        chi2, shape, numbers, _ = max(found, key=lambda one: one[0])
+        chi2, shape, numbers = max(found, key=lambda one: one[0])[:3]
         if not effect.once and chi2 - before < WORTH:
             break
         more = _itself(effect, shape, numbers)

@@ -510,16 +510,20 @@ def own_part(trial: Trial) -> float:
 
 def ranking(tried: Sequence[Trial], size: int) -> list[Scored]:
     """Of each effect at its best shape, best first."""
-    best: dict[int, Scored] = {}
+    found: dict[int, list[tuple[float, int, Trial]]] = {}
     for trial in tried:
-        chi2, freedom = explained(trial.gram, trial.product)
-        if not freedom:
-            continue
-        chi2 = chi2 / trial.inflation - naming.inexact(trial)
-        found = (float(score(chi2, freedom, trial.effect.choices, size)), chi2, freedom, trial)
-        if id(trial.effect) not in best or found[0] > best[id(trial.effect)][0]:
-            best[id(trial.effect)] = found
-    return sorted(best.values(), key=lambda each: -each[0])
+        gain, freedom = explained(trial.gram, trial.product)
+        if freedom:
+            found.setdefault(id(trial.effect), []).append((gain - naming.inexact(trial), freedom, trial))
+    best = []
+    for some in found.values():
+        chi2s = naming.by_shapes([each[0] for each in some], [each[2].inflation for each in some])
+        scored = [
+            (float(score(chi2, freedom, trial.effect.choices, size)), chi2, freedom, trial)
+            for chi2, (_, freedom, trial) in zip(chi2s, some, strict=True)
+        ]
+        best.append(max(scored, key=lambda each: each[0]))
+    return sorted(best, key=lambda each: -each[0])
 
 
 def _predicts(without: Regression, extended: Regression) -> bool:

@@ -22,6 +22,7 @@ PAYS = 10.0  # gain of the information criterion that an effect must reach
 TIE = 6.0  # effects within this of the best are ties
 EITHER_SIGN = 2.0  # standard errors of 0 within which a coefficient may have either sign
 MOST = 4  # number of accepted effects
+NEARLY = 0.1  # of an inflation: another shape's is the same
 
 
 @dataclasses.dataclass
@@ -162,8 +163,22 @@ def possible(trial: Trial) -> bool:
     )
 
 
+def by_shapes(gains: Sequence[float], inflations: Sequence[float]) -> list[float]:
+    """Chi-squares of one effect at several shapes; inflations near that of the best shape count as the same one.
+
+    It is a little larger or smaller at each shape, and of a large effect a hundred-thousandth is more than the
+    difference between two shapes.
+    """
+    best = int(np.argmax([gain / each for gain, each in zip(gains, inflations, strict=True)]))
+    same = inflations[best]
+    return [
+        gain / (same if abs(each - same) < NEARLY * same else each)
+        for gain, each in zip(gains, inflations, strict=True)
+    ]
+
+
 def inexact(trial: Trial) -> float:
-    """Chi-square that an exact effect loses where its coefficient is the shape itself.
+    """What an exact effect loses of its gain (a chi-square times its inflation) where its coefficient is the shape.
 
     The smallest shape of its grid is one of first order.
     """
@@ -174,7 +189,7 @@ def inexact(trial: Trial) -> float:
     value = float(trial.product[0]) / max(size, 1e-300)
     if shape <= min(each[effect.equals] for each in effect.shapes) and value < shape:
         return 0.0
-    return (value - shape) ** 2 * size / trial.inflation
+    return (value - shape) ** 2 * size
 
 
 def refit(

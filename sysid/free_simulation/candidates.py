@@ -96,9 +96,14 @@ def at_output(output: Output, recordings: Sequence[Recording], or_late: str = ""
             seen, lag_s = r.signals[sensed(name)], shape[each.time]
             return {place: (each.late(r.table, seen, lag_s) - seen) / lag_s}
 
+        def before(r: Recording, shape: Shape) -> dict[str, Array]:
+            seen, lag_s = r.signals[sensed(name)], shape[each.time]
+            return {place: each.before(r.table, seen, each.late(r.table, seen, lag_s), lag_s)}
+
         return Term(
             "sensor_lag", name, "sensor", ("lag_s",), make, each.shapes(recordings), each.fits(recordings),
             meaning=f"{name} {each.words}{or_late}", independent=True, form=each.form, scale=each.time,
+            before=before,
         )  # fmt: skip
 
     return [
@@ -142,9 +147,14 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
             given, lag_s = r.signals[name], shape[form.time]
             return {into(name): (late(r.table, given, lag_s, r.ways[name]) - given) / lag_s}
 
+        def before(r: SimulatedRecording, shape: Shape) -> dict[str, Array]:
+            given, lag_s = r.signals[name], shape[form.time]
+            return {into(name): form.before(r.table, given, late(r.table, given, lag_s, r.ways[name]), lag_s)}
+
         return Term(
             "input_lag", name, "input", ("lag_s",), make, form.shapes(recordings), form.fits(recordings),
             meaning=f"the machine gets {name} {meaning}", independent=True, form=form.form, scale=form.time,
+            before=before,
         )  # fmt: skip
 
     made += [

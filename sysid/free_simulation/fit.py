@@ -16,7 +16,7 @@ from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.predictor import STRETCH, Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.simulator import Simulator
-from ranger_sim.sysid.free_simulation.terms import Acting, into, sensed
+from ranger_sim.sysid.free_simulation.terms import Acting, Term, into, sensed
 from ranger_sim.sysid.machine import Values
 
 SHORT_STRETCH = 100  # samples, in rounds that only lead to the answer: covariances of four times as many side by side
@@ -104,6 +104,7 @@ class TrajectoryFit:
         self.acting: list[Acting] = []
         self.enter: list[effects.Entering] = []  # of what acts, along the trajectory of the last round
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
+        self.unknown = 0  # number of the last coefficients, which are of what was there before the recording
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.last_step = np.inf  # largest one of a parameter in the last round, in its standard errors
@@ -123,7 +124,12 @@ class TrajectoryFit:
     def surprise(self) -> float:
         """-2 log likelihood of the recording under the last round's simulator and noise, up to a constant."""
         assert self.predictor is not None
-        return float(np.sum((self.response / self.predictor.unit) ** 2) + self.predictor.surprise_of_spread)
+        found = float(np.sum((self.response / self.predictor.unit) ** 2) + self.predictor.surprise_of_spread)
+        if self.unknown:
+            columns = (self.columns[:, :, -self.unknown :] / self.predictor.unit[:, None]).reshape(-1, self.unknown)
+            spread = np.linalg.slogdet(np.eye(self.unknown) + columns.T @ columns)[1]
+            found += float(np.sum(self.unknown_at**2) + spread)
+        return found
 
     @property
     def lost(self) -> bool:
@@ -135,25 +141,40 @@ class TrajectoryFit:
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "TrajectoryFit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
         new, count = copy.copy(self), self.count
-        new.acting = list(acting)
-        added = np.array([each for one in acting for each in one.coefficients])
+        unknown = [each for one in acting for each in self._before(one)]
+        new.acting = [*acting, *unknown]
+        new.unknown = sum(len(each.coefficients) for each in unknown)
+        added = np.array([each for one in new.acting for each in one.coefficients])
         new.p = np.concatenate((self.p_at[:count], added))
         new.low, new.high = (
             np.concatenate((limit[:count], np.full(len(added), beyond)))
             for limit, beyond in ((self.low, -np.inf), (self.high, np.inf))
         )
         new.size_p = np.concatenate((self.size_p[:count], np.where(added != 0.0, np.abs(added), 1.0)))
-        new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
+        new.moves = np.ones(len(new.p))
+        new.moves[count : len(new.p) - new.unknown] = 0.0 if fixed else 1.0
         new.damped = np.zeros(len(new.p))
         new.came_from = (new.x, new.u, new.p)
         new.enter, new.last_step = [], np.inf  # until the first round
         return new
 
+    def _before(self, each: Acting) -> list[Acting]:
+        """What was there before the recording, where this effect remembers it; the numbers begin at 0."""
+        before = each.term.before
+        if before is None:
+            return []
+        columns = before(self.seen(), each.shape)
+        term = Term(
+            "", each.term.at, each.term.subsystem, (), lambda recording, shape, values: before(recording, shape)
+        )
+        count = next(iter(columns.values())).shape[1]
+        return [Acting(term, each.shape, (0.0,) * count, unknown=True)] if count else []
+
     def settled_with(self, acting: Sequence[Acting]) -> bool:
         """True where nothing moves any more with just these effects, whatever their coefficients started from."""
-        same = len(self.acting) == len(acting) and all(
-            here.term is other.term and here.shape == other.shape
-            for here, other in zip(self.acting, acting, strict=True)
+        known = [each for each in self.acting if not each.unknown]
+        same = len(known) == len(acting) and all(
+            here.term is other.term and here.shape == other.shape for here, other in zip(known, acting, strict=True)
         )
         return same and self.settled and not np.any(self.damped) and bool(np.all(self.moves))
 
@@ -167,7 +188,9 @@ class TrajectoryFit:
         new = self.acted_on(acting, fixed=False)
         new.x, new.u, start = self.began
         new.p = np.concatenate((start[:count], np.zeros(len(new.p) - count)))
-        new.damped = np.concatenate((np.zeros(count), np.full(len(new.p) - count, DAMPED)))
+        new.damped = np.concatenate(
+            (np.zeros(count), np.full(len(new.p) - count - new.unknown, DAMPED), np.zeros(new.unknown))
+        )
         new.came_from, new.predictor = (new.x, new.u, new.p), None
         new.noise_y = self.shown_y
         return new
@@ -334,6 +357,7 @@ class TrajectoryFit:
         decides where: its rounds are careful.
         """
         self.lin = lin = self.linearise(final)
+        self.unknown_at = self.p[len(self.p) - self.unknown :]
         short = (
             not final
             and bool(self.acting)
@@ -377,9 +401,12 @@ class TrajectoryFit:
         a: (n, p) columns for a change of `size_p`; b: (n,). A parameter that would leave its limits goes to the limit,
         and the others are fitted again: cut off alone, it would leave them where only its full step belongs to them.
         """
-        length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
-        scaled = np.vstack((a / length, np.diag(self.damped)))
-        wanted = np.concatenate((b, -self.damped * self.p * length / self.size_p))
+        known = np.zeros(len(self.p))
+        known[len(known) - self.unknown :] = self.size_p[len(known) - self.unknown :]  # 0, with a deviation of 1
+        length = np.maximum(np.hypot(np.linalg.norm(a, axis=0), known), 1e-30)
+        pull = self.damped + known / length
+        scaled = np.vstack((a / length, np.diag(pull)))
+        wanted = np.concatenate((b, -pull * self.p * length / self.size_p))
         change, error = np.zeros(len(self.p)), np.zeros(len(self.p))
         free = np.ones(len(self.p), dtype=bool)
         # a triangle with the same products of columns: of few rows, and none of the digits is lost by squaring

@@ -96,8 +96,10 @@ class LinearisedRecording(SimulatedRecording):
 def one_step_ahead(fit: TrajectoryFit) -> LinearisedRecording:
     """The equations as white errors of a prediction by one sample."""
     fit.round_again()
-    assert fit.predictor is not None
-    return _made(fit, fit.predictor, fit.response, fit.columns, fit.predictor.unit)
+    predictor = fit.predictor
+    assert predictor is not None
+    _forget(fit, predictor, fit.columns)
+    return _made(fit, predictor, predictor.known(fit.response), predictor.known(fit.columns), predictor.unit)
 
 
 def free(fit: TrajectoryFit) -> LinearisedRecording:
@@ -109,11 +111,19 @@ def free(fit: TrajectoryFit) -> LinearisedRecording:
     starts = np.array([k for run in fit.table.runs for k in range(run.start, run.stop, window)])
     predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.open_outputs(), fit.open_steps(), starts,
                           AWAY * fit.size_x, stretch=window)  # fmt: skip
-    missed = predictor.white(predictor.errors(fit.state[:, :, None], fit.output[:, :, None]))[:, :, 0]
     columns = predictor.white(predictor.errors(fit.lin.f_p, fit.lin.h_p))
+    _forget(fit, predictor, columns)
+    missed = predictor.white(predictor.errors(fit.state[:, :, None], fit.output[:, :, None]))[:, :, 0]
+    columns = predictor.known(columns)
     made = _made(fit, predictor, missed, columns, _by_noise(fit, predictor))
     made.whitened = False
     return made
+
+
+def _forget(fit: TrajectoryFit, predictor: Predictor, columns: Array) -> None:
+    """What was there before the recording is not known: the last of these white columns (n, o, parameters)."""
+    if fit.unknown:
+        predictor.forget(columns[:, :, -fit.unknown :])
 
 
 def _by_noise(fit: TrajectoryFit, predictor: Predictor) -> Array:

@@ -145,9 +145,12 @@ class SimulatedMachine(DeclaredMachine):
             if not acting:
                 continue
             tried = fit.with_all(acting)
-            tried.settle(follow=True)
-            _chosen(tried)
-            made = linearised.one_step_ahead(tried)
+            try:
+                tried.settle(follow=True)
+                _chosen(tried)
+                made = linearised.one_step_ahead(tried)
+            except (UserError, np.linalg.LinAlgError):  # it runs away with these: another fit is the better one
+                continue
             if tried.surprise < best.surprise:
                 best, recording = tried, made
         return recording

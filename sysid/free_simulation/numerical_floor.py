@@ -22,15 +22,15 @@ OPEN = 1e-6  # of a state's size: a law that leaves less open is not open
 
 def moved(fit: TrajectoryFit) -> Array:
     """(variants, coefficients): what the coefficients of what acts move by."""
-    count = len(fit.simulator.names)
+    acting = slice(fit.count, len(fit.p_at) - fit.unknown)
     out = []
     for other in _otherwise(fit):
         other.settle(ROUNDS)
-        out.append(other.p[count:] - fit.p_at[count:])
+        out.append(other.p[acting] - fit.p_at[acting])
     for other in _held_otherwise(fit):
         other.settle(MORE_ROUNDS)
         if other.surprise - fit.surprise < CHOSEN:  # the data do not show which it is
-            out.append(other.p[count:] - fit.p_at[count:])
+            out.append(other.p[acting] - fit.p_at[acting])
     return np.array(out)
 
 

@@ -107,6 +107,7 @@ class Predictor:
                 self.band[s + row - column, place] = -self.inner[:-1, row, column]
         # in units of the channels: the errors are white, and as large as the middle one
         self.unit = np.median(np.abs(self.spread[:, np.arange(o), np.arange(o)]), axis=0)
+        self._unknown: tuple[Array, Array] | None = None  # directions (n o, m) of unknown numbers, and parts to take
 
     def reached(self, samples: np.ndarray) -> Array:
         """(m, s, s) covariances before these samples, by what comes before them.
@@ -140,7 +141,24 @@ class Predictor:
 
     def white(self, errors: Array) -> Array:
         """(n, o, k) of one deviation each, in the channels' units."""
-        return (self.unspread @ errors) * self.unit[None, :, None]
+        return self.known((self.unspread @ errors) * self.unit[None, :, None])
+
+    def forget(self, white: Array) -> None:
+        """From now on white errors are those with further unknown numbers, each of mean 0 and deviation 1, of which a
+        unit adds these columns (n, o, m)."""
+        columns = (white / self.unit[None, :, None]).reshape(self.n * self.o, -1)
+        directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+        self._unknown = directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
+
+    def known(self, white: Array) -> Array:
+        """White errors (n, o, k), or (n, o), after the unknown numbers of `forget`, if there are any: white again."""
+        if self._unknown is None:
+            return white
+        directions, parts = self._unknown
+        unit = self.unit[:, None] if white.ndim == 3 else self.unit
+        flat = (white / unit).reshape(self.n * self.o, -1)
+        less: Array = directions @ (parts[:, None] * (directions.T @ flat))
+        return (flat - less).reshape(white.shape) * unit
 
     def left(self, state: Array, output: Array) -> Array:
         """(n, o) errors of the first of these forcings, of one deviation each, after the others took what they can."""

@@ -101,7 +101,8 @@ class Term:
 
     make(recording, shape, values) -> by port (n,) for one coefficient or (n, k) for k. recording.signals: states,
     inputs, outputs and `t` along the fitted trajectory, (n,) by name, and the signals that `SimulatedMachine.signals`
-    adds. independent: it does not depend on `values`.
+    adds. independent: it does not depend on `values`. before(recording, shape) -> by port (n, m): what was there before
+    the recording may add, of deviation 1 each. The fit has these numbers while the term acts, and no answer has them.
     """
 
     cause: str
@@ -117,6 +118,7 @@ class Term:
     form: str = ""
     scale: str | None = None
     once: bool = False
+    before: Callable[[Any, Shape], Ports] | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,8 +130,10 @@ class SimulatedEffect(Effect):
 
 @dataclasses.dataclass(frozen=True)
 class Acting:
-    """An effect that acts in the simulator: its term at a shape, and coefficients."""
+    """An effect that acts in the simulator: its term at a shape, and coefficients. unknown: these are of one recording,
+    by what was there before it."""
 
     term: Term
     shape: Shape
     coefficients: tuple[float, ...]
+    unknown: bool = False

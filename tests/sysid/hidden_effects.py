@@ -56,6 +56,7 @@ CASES = (
     Case(*STAND, "coulomb", 0.004, (("coulomb_friction", "w"), ("direction_friction", "w")), "coulomb_torque", 0.004),
     Case(*STAND, "warming", 1.0, (("parameter_drift", "b"),), "change_1e-5Nms", -2.1),
     Case(*STAND, "seizing", 0.5, (("parameter_drift", "b"),), "change_1e-5Nms", 1.05),
+    Case(*STAND, "late", 0.2, (("input_lag", "V"),), "lag_s", 0.2),
     Case(*ROD, "none", 0.0, ()),
     Case(*ROD, "radiation", 2e-9, (("radiation", "hot end"),), "nW_per_K4", 2.0),
     Case(*ROD, "heater", 0.05, ()),  # what scales heater, capacities and conductances alike cannot be seen

@@ -41,8 +41,14 @@ def thrust_stand(cause, size, seed, seconds=20.0, rate_hz=200.0):
     rows = round(seconds * rate_hz)
     fine_s = np.arange(rows * FINE + 1) / rate_hz / FINE
     levels = draw.uniform(5.0, 13.0, int(seconds) + 2)
-    volts = np.interp(fine_s, np.arange(len(levels)), levels)
-    volts += sum(0.35 * np.sin(2.0 * np.pi * f * fine_s + draw.uniform(0.0, 6.28)) for f in (0.3, 0.7, 1.3, 2.1, 3.7))
+    waves = [(f, draw.uniform(0.0, 6.28)) for f in (0.3, 0.7, 1.3, 2.1, 3.7)]
+
+    def given(at_s):
+        slow = np.interp(at_s, np.arange(len(levels)), levels)
+        return slow + sum(0.35 * np.sin(2.0 * np.pi * f * at_s + phase) for f, phase in waves)
+
+    volts = given(fine_s)
+    driven = given(fine_s - size) if cause == "late" else volts  # before the recording it was another one
     resistance, constant, thrust = 0.145, 0.0113, 7.9e-6
 
     def current(speed, heat, v):
@@ -58,17 +64,16 @@ def thrust_stand(cause, size, seed, seconds=20.0, rate_hz=200.0):
         filtered = (thrust * speed * speed - lagging) / size if cause == "lag" else 0.0
         return torque / 4.2e-5, (i * i / 100.0 - heat) / 8.0, filtered, 1.0
 
-    done = integrated(rates, [400.0, 0.0, thrust * 400.0**2, 0.0], volts.tolist(), 1.0 / rate_hz)
-    v = volts[:-1:FINE]
+    done = integrated(rates, [400.0, 0.0, thrust * 400.0**2, 0.0], driven.tolist(), 1.0 / rate_hz)
     pull = done[:, 2] if cause == "lag" else thrust * done[:, 0] ** 2
     pull = pull * (1.0 + (size if cause == "scale" else 0.0)) + (size if cause == "offset" else 0.0)
     return table(
         f"thrust stand {cause} {seed}",
         fine_s[:-1:FINE],
-        voltage_V=v,
+        voltage_V=volts[:-1:FINE],
         thrust_N=pull + 0.02 * draw.normal(size=rows),
         speed_rad_per_s=done[:, 0] + 0.5 * draw.normal(size=rows),
-        current_A=current(done[:, 0], done[:, 1], v) + 0.05 * draw.normal(size=rows),
+        current_A=current(done[:, 0], done[:, 1], driven[:-1:FINE]) + 0.05 * draw.normal(size=rows),
     )
 
 

@@ -191,6 +191,12 @@ def test_a_shape_on_a_scale_is_tried_between_the_best_and_its_neighbours(best, w
     assert intervals._shapes(dataclasses.replace(named(), effect=plain_effect, shape={"s": best})) == grid
 
 
+def test_shapes_of_a_large_effect_are_compared_at_one_inflation_and_others_at_their_own():
+    """1000000 / 1.00001 is less than 999995: by its inflation alone the first, better shape would be the worse one."""
+    assert naming.by_shapes([1e6, 999995.0, 12.0], [1.00001, 1.0, 1.2]) == pytest.approx([1e6, 999995.0, 10.0])
+    assert naming.by_shapes([20.0, 30.0], [1.0, 3.0]) == pytest.approx([20.0, 10.0])
+
+
 # --- a learned table --------------------------------------------------------------------------------------------------
 
 

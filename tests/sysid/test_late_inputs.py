@@ -7,10 +7,12 @@ from scipy.signal import lfilter
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.forms import DELAY, FILTER
 from ranger_sim.sysid.free_simulation.candidates import given_late, given_slowly
+from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 from ranger_sim.sysid.free_simulation.recording import Way
 from ranger_sim.sysid.pipeline import diagnose
-from tests.sysid.hidden_effects import CASES
+from tests.sysid.hidden_effects import CASES, SHORT
 from tests.sysid.machines_of_a_user import HeatedRod
 from tests.sysid.test_input_limits import FINER, Pendulum, STEP_s, swung
 
@@ -23,9 +25,12 @@ def _late(lag_s, finer=STEP_s / FINER):
     return lambda given: np.concatenate((np.full(steps, given[0]), given))[: len(given)]
 
 
-def _slow(lag_s):
+def _slow(lag_s, start=None):
+    """A low-pass at `start` when the recording begins, or settled."""
     kept = np.exp(-STEP_s / FINER / lag_s)
-    return lambda given: lfilter([1.0 - kept], [1.0, -kept], given, zi=[kept * given[0]])[0]
+    return lambda given: lfilter([1.0 - kept], [1.0, -kept], given, zi=[kept * (given[0] if start is None else start)])[
+        0
+    ]
 
 
 def _held(given):
@@ -47,6 +52,53 @@ def test_a_torque_that_comes_late_is_named_with_its_lag(form, lag_s, bend):
     assert value.ci95[0] <= lag_s <= value.ci95[1]
     assert value.value == pytest.approx(lag_s, rel=0.02)
     assert result.gain.fraction_of_achievable > 0.95
+
+
+def test_a_low_pass_need_not_have_settled_when_the_recording_begins():
+    """It begins at 2 N m, and at less than 1 N m of the torque."""
+    bend = _slow(0.5, start=2.0)
+    (found,) = diagnose(Pendulum(), [swung(13, bend)], [swung(14, bend)]).result.causes
+    assert (found.name, found.at, found.form) == ("input_lag", "torque", "filter")
+    value = found.parameters["time_constant_s"]
+    assert value.ci95[0] <= 0.5 <= value.ci95[1]
+    assert found.parameters["lag_s"].value == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_voltage_of_before_the_recording_that_arrives_in_it_is_no_further_cause():
+    """Its first 40 rows are moved by what was given before it; the offset of a sensor or a jump would be as much."""
+    (case,) = (each for each in CASES if each.title == "thrust-stand late")
+    (found,) = case.found(1, **SHORT["thrust-stand"]).result.causes
+    assert (found.name, found.at, found.form) == ("input_lag", "V", "delay")
+    for each in found.parameters.values():
+        assert each.ci95[0] <= 0.2 <= each.ci95[1]
+        assert each.value == pytest.approx(0.2, rel=0.001)
+
+
+def _two_runs():
+    time_s = np.concatenate((STEP_s * np.arange(50), 3.0 + STEP_s * np.arange(40)))
+    given = generator(2, "runs").normal(size=90)
+    return Table(time_s, {"u": given}, (slice(0, 50), slice(50, 90)), "two runs"), given
+
+
+def test_what_a_low_pass_remembers_of_before_a_run_falls_with_its_time_constant():
+    table, given = _two_runs()
+    late = FILTER.late(table, given, 0.03)
+    before = FILTER.before(table, given, late, 0.03)
+    usual = np.sqrt(np.mean((late - given) ** 2))
+    alone = usual * np.exp(-STEP_s * np.arange(50) / 0.03)
+    assert before[:50] == pytest.approx(np.column_stack((alone, np.zeros(50))))
+    assert before[50:] == pytest.approx(np.column_stack((np.zeros(40), alone[:40])))
+
+
+@pytest.mark.parametrize(("lag_s", "rows", "numbers"), [(0.004, 1, 1), (0.03, 3, 3), (0.2, 20, 8)])
+def test_a_delay_shows_what_was_before_a_run_for_as_long_as_it_is(lag_s, rows, numbers):
+    """Each row has its number, or lies on a straight line between two; in all of them it grows towards the start."""
+    table, given = _two_runs()
+    before = DELAY.before(table, given, 2.0 + given, lag_s)
+    assert before.shape == (90, 2 * numbers)
+    assert not np.any(before[rows:50]) and not np.any(before[50 + rows :])
+    assert not np.any(before[:50, numbers:]) and not np.any(before[50:, :numbers])
+    assert before[:50].sum(axis=1)[:rows] == pytest.approx(2.0 * np.sqrt(1.0 - STEP_s * np.arange(rows) / lag_s))
 
 
 def test_a_held_torque_that_comes_late_is_late_by_its_delay_alone():
@@ -121,8 +173,8 @@ def test_a_smooth_input_that_is_late_is_what_it_was_before():
 class LostPendulum(Pendulum):
     """It gives no numbers with any cause in it."""
 
-    def again(self, recording, acting, fixed=False):
-        raise UserError(f"{recording.table.name}: the simulator of {self.name} gives no numbers on this recording")
+    def again(self, *given, **options):
+        raise UserError("run: the simulator gives no numbers on this recording")
 
 
 def test_a_cause_with_which_the_simulator_gives_no_numbers_is_a_finding_without_a_name():
@@ -131,6 +183,15 @@ def test_a_cause_with_which_the_simulator_gives_no_numbers_is_a_finding_without_
     assert result.detected
     (lost,) = (each for each in result.data_findings if each.kind == "runs_away")
     assert "input_lag" in lost.text and lost.text.endswith("the simulation runs away")
+
+
+def test_candidates_with_which_the_simulator_runs_away_are_left_out(monkeypatch):
+    """The fit without them stays, and other candidates are tried: data are not refused for a candidate's sake."""
+    machine = Pendulum()
+    recording = machine.prepare(swung(13, _slow(0.08)))
+    monkeypatch.setattr(TrajectoryFit, "settle", LostPendulum.again)
+    effects = [each for each in machine.effects([recording]) if each.cause == "input_lag"]
+    assert machine.about_all(recording, [(each, each.shapes[0]) for each in effects]) is recording
 
 
 def _lags(machine):

@@ -96,6 +96,28 @@ def test_errors_are_white_as_by_the_factor_of_the_whole_covariance(seed, noisy):
     assert predictor.unit == pytest.approx(np.median(diagonal, axis=0), rel=1e-12)
 
 
+def test_errors_stay_white_with_numbers_of_before_the_recording_that_nobody_knows():
+    """Their products are those by the inverse of the whole covariance, to which the unknown numbers add."""
+    system = System(5)
+    predictor = system.predictor()
+    state, output = system.rng.normal(size=(N, S, 5)), system.rng.normal(size=(N, OUT, 5))
+    white = predictor.white(predictor.errors(state, output))
+    predictor.forget(white[:, :, 3:])
+    found = (predictor.known(white) / predictor.unit[None, :, None]).reshape(N * OUT, 5)
+    assert predictor.known(white[:, :, 0]) == pytest.approx(predictor.known(white)[:, :, 0], rel=1e-12)
+    assert predictor.white(predictor.errors(state, output)) == pytest.approx(predictor.known(white), rel=1e-12)
+    covariance, shown = np.zeros((N * OUT, N * OUT)), np.zeros((N * OUT, 5))
+    for start, end in zip(STARTS, ENDS, strict=True):
+        _, _, outputs, deviations, driven = system.segment(start, end)
+        flat = outputs.reshape((end - start) * OUT, -1) * deviations
+        rows = slice(start * OUT, end * OUT)
+        covariance[rows, rows] = flat @ flat.T
+        moved = np.einsum("akbc,bcj->akj", driven, state[start:end])
+        shown[rows] = (np.einsum("koa,kaj->koj", system.lin.h_x[start:end], moved) + output[start:end]).reshape(-1, 5)
+    wanted = shown.T @ np.linalg.solve(covariance + shown[:, 3:] @ shown[:, 3:].T, shown)
+    assert found.T @ found == pytest.approx(wanted, rel=1e-8, abs=1e-8)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_most_probable_states_and_inputs_are_the_conditional_mean(seed):
     """x[k+1] = A x[k] - state[k] + B u[k] + what is loose; output[k] = C x[k] + D u[k] + the sensors' noise."""
