@@ -7,7 +7,7 @@ import numpy as np
 
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
-from ranger_sim.sysid.free_simulation.terms import Acting
+from ranger_sim.sysid.free_simulation.terms import Acting, Term
 from ranger_sim.sysid.machine import Values
 
 NUDGE = 1e-6  # of a state's size: step of a central difference
@@ -20,6 +20,16 @@ Entering = dict[int, Array]  # by number of the port (n, k), for a unit of each 
 def entering(each: Acting, seen: SimulatedRecording, values: Values) -> Entering:
     """What an effect puts into the ports along a trajectory."""
     return seen.entering(each.term.make(seen, each.shape, values))
+
+
+def before(each: Acting, seen: SimulatedRecording) -> list[Acting]:
+    """What was there before the recording, where an effect remembers it; the numbers begin at 0."""
+    remembered = each.term.before
+    if remembered is None:
+        return []
+    count = next(iter(remembered(seen, each.shape).values())).shape[1]
+    term = Term("", each.term.at, each.term.subsystem, (), lambda recording, shape, _: remembered(recording, shape))
+    return [Acting(term, each.shape, (0.0,) * count, unknown=True)]
 
 
 def total(enter: Sequence[Entering], coefficients: Sequence[Array], rows: int, ports: int) -> Array:

@@ -16,7 +16,7 @@ from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.predictor import STRETCH, Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.simulator import Simulator
-from ranger_sim.sysid.free_simulation.terms import Acting, Term, into, sensed
+from ranger_sim.sysid.free_simulation.terms import Acting, into, sensed
 from ranger_sim.sysid.machine import Values
 
 SHORT_STRETCH = 100  # samples, in rounds that only lead to the answer: covariances of four times as many side by side
@@ -104,7 +104,6 @@ class TrajectoryFit:
         self.acting: list[Acting] = []
         self.enter: list[effects.Entering] = []  # of what acts, along the trajectory of the last round
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
-        self.unknown = 0  # number of the last coefficients, which are of what was there before the recording
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.last_step = np.inf  # largest one of a parameter in the last round, in its standard errors
@@ -119,6 +118,11 @@ class TrajectoryFit:
     def count(self) -> int:
         """Number of the machine's own parameters."""
         return len(self.simulator.names)
+
+    @property
+    def unknown(self) -> int:
+        """Number of the last coefficients, which are of what was there before the recording."""
+        return sum(len(each.coefficients) for each in self.acting if each.unknown)
 
     @property
     def surprise(self) -> float:
@@ -141,9 +145,8 @@ class TrajectoryFit:
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "TrajectoryFit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
         new, count = copy.copy(self), self.count
-        unknown = [each for one in acting for each in self._before(one)]
+        unknown = [each for one in acting if one.term.before for each in effects.before(one, self.seen())]
         new.acting = [*acting, *unknown]
-        new.unknown = sum(len(each.coefficients) for each in unknown)
         added = np.array([each for one in new.acting for each in one.coefficients])
         new.p = np.concatenate((self.p_at[:count], added))
         new.low, new.high = (
@@ -157,18 +160,6 @@ class TrajectoryFit:
         new.came_from = (new.x, new.u, new.p)
         new.enter, new.last_step = [], np.inf  # until the first round
         return new
-
-    def _before(self, each: Acting) -> list[Acting]:
-        """What was there before the recording, where this effect remembers it; the numbers begin at 0."""
-        before = each.term.before
-        if before is None:
-            return []
-        columns = before(self.seen(), each.shape)
-        term = Term(
-            "", each.term.at, each.term.subsystem, (), lambda recording, shape, values: before(recording, shape)
-        )
-        count = next(iter(columns.values())).shape[1]
-        return [Acting(term, each.shape, (0.0,) * count, unknown=True)] if count else []
 
     def settled_with(self, acting: Sequence[Acting]) -> bool:
         """True where nothing moves any more with just these effects, whatever their coefficients started from."""

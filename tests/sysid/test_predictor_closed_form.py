@@ -96,7 +96,7 @@ def test_errors_are_white_as_by_the_factor_of_the_whole_covariance(seed, noisy):
     assert predictor.unit == pytest.approx(np.median(diagonal, axis=0), rel=1e-12)
 
 
-def test_errors_stay_white_with_numbers_of_before_the_recording_that_nobody_knows():
+def test_errors_stay_white_with_unknown_numbers_from_before_the_recording():
     """Their products are those by the inverse of the whole covariance, to which the unknown numbers add."""
     system = System(5)
     predictor = system.predictor()
