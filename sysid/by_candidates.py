@@ -44,6 +44,7 @@ FEW_SHAPES = 9  # of a candidate that acts at all of them while a simulator is l
 # Simulations with the named effects, at most, and where only the size of a named lag still moves: it goes to and fro
 # about its place
 AGAIN, LAG_AGAIN = 3, 8
+STEEPEST = -2.0  # of the likeliest shape by the simulated one: steeper is noise. Chosen by us
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 # Times what numerics move it by: a named effect is at least so large. A lag is a stamp's, up to half a row, in one of
 # the ways in which an input may go between its rows where it is below twice of the half row between these
@@ -188,10 +189,11 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
     floor: dict[str, tuple[float, ...]] = {}
     small: list[str] = []
     lost: list[Finding] = []
+    tried: dict[str, list[tuple[float, float]]] = {}
     for number in range(LAG_AGAIN if found.named and hasattr(machine, "again") else 0):
         progress("simulated again", 0.5 + 0.2 * min(1.0, number / AGAIN))
         previous = found
-        effects = _finer(effects, found, skews)
+        effects = _finer(effects, found, skews, tried)
         linearised = [*recordings, *held]
         recordings, held, lost = _simulated_again(simulations, recordings, held, found)
         if all(new is old for new, old in zip([*recordings, *held], linearised, strict=True)):
@@ -390,8 +392,16 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
     return cast(Recording, machine.about_all(recording, acting, families))  # type: ignore[attr-defined]
 
 
-def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequence[Named]) -> list[Effect]:
-    """The effects, those found at a shape on a scale with a finer grid about it; found gets them as well."""
+def _finer(
+    effects: Sequence[Effect],
+    found: likelihood.Selection,
+    fixed: Sequence[Named],
+    tried: dict[str, list[tuple[float, float]]],
+) -> list[Effect]:
+    """The effects, those found at a shape on a scale with a finer grid about it; found gets them as well.
+
+    tried: by lag, its simulated shapes with the likeliest shapes about them; it gets the next one.
+    """
     out = list(effects)
     for each in found.named:
         if each.effect.scale is None:
@@ -402,6 +412,9 @@ def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequen
         # the grid stays: the first simulation of a large effect may be several of its shapes away from the last one
         shapes = [*old.shapes, *(shape for shape in [each.shape, *intervals.between(each)] if shape not in old.shapes)]
         each.shape, _ = intervals.profile(each, base)
+        if old.cause in LAGS:
+            following = _next(tried.setdefault(old.name, []), each.shape[old.scale])
+            each.shape = {**each.shape, old.scale: following}
         each.effect = dataclasses.replace(old, shapes=shapes)
         # its rivals of the same kind as well: the one with the finer grid would win by it
         kind = (old.cause, old.form, old.scale)
@@ -416,6 +429,24 @@ def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequen
     if found.named:
         found.with_named = naming.refit(found.base, found.named, [*fixed, *found.named])
     return out
+
+
+def _next(tried: list[tuple[float, float]], likeliest: float) -> float:
+    """The shape of a lag to simulate next, where one that was simulated has the likeliest shape about it.
+
+    It may be beyond the right one, the more, the farther that is from the simulated one: a secant ends the going to and
+    fro. tried gets the next one.
+    """
+    if tried:
+        tried[-1] = (tried[-1][0], likeliest)
+    following = likeliest
+    if len(tried) > 1:
+        (one, about_one), (other, about_other) = tried[-2:]
+        slope = (about_other - about_one) / (other - one) if other != one else 0.0
+        if STEEPEST < slope < 0.0:
+            following = (likeliest - slope * other) / (1.0 - slope)
+    tried.append((following, following))
+    return following
 
 
 def _numerical_floor(

@@ -30,13 +30,13 @@ Shape = Mapping[str, float]
 @dataclasses.dataclass(frozen=True)
 class Lag:
     """A form of a sensor's lag. time: name of its shape; late(table, columns, lag_s): columns (n,) or (n, k) behind it;
-    remembered(since_s, lag_s): (rows, m) what each of m numbers from before a run adds since its start; reaches: times
-    the lag that what it shows depends on; words: after a sensor's name."""
+    remembered(since_s, lag_s, most): (rows, m) what each of at most so many numbers from before a run adds since its
+    start; reaches: times the lag that what it shows depends on; words: after a sensor's name."""
 
     form: str
     time: str
     late: Callable[[Table, Array, float], Array]
-    remembered: Callable[[Array, float], Array]
+    remembered: Callable[[Array, float, int], Array]
     reaches: float
     words: str
 
@@ -55,11 +55,12 @@ class Lag:
     def before(self, table: Table, column: Array, late: Array, lag_s: float) -> Array:
         """(n, m) what was there before each run may add to `late`, each column with a deviation of 1: as much as the
         column (n,) usually changes by the lag."""
+        most = max(1, min(MOST_BEFORE, MOST_BEFORE_RUNS // len(table.runs)))
         found = []
         for run in table.runs[:MOST_BEFORE_RUNS]:
-            remembered = self.remembered(table.time_s[run] - table.time_s[run][0], lag_s)
-            columns = np.zeros((len(table), min(remembered.shape[1], MOST_BEFORE_RUNS // len(table.runs) or 1)))
-            columns[run] = remembered[:, : columns.shape[1]]
+            remembered = self.remembered(table.time_s[run] - table.time_s[run][0], lag_s, most)
+            columns = np.zeros((len(table), remembered.shape[1]))
+            columns[run] = remembered
             found.append(columns)
         return np.hstack(found) * np.sqrt(np.mean((late - column) ** 2))
 
@@ -111,18 +112,18 @@ def filtered(table: Table, column: Array, lag_s: float) -> Array:
     return out
 
 
-def _of_a_delay(since_s: Array, lag_s: float) -> Array:
+def _of_a_delay(since_s: Array, lag_s: float, most: int) -> Array:
     """Values of each row that shows what was before the start, or of some with straight lines in between; the less
     unlike the first value, the nearer to it."""
     rows = int(np.count_nonzero(lag_s - since_s > ROUNDED * lag_s))
-    knots = np.linspace(0.0, rows - 1.0, min(rows, MOST_BEFORE))
+    knots = np.linspace(0.0, rows - 1.0, min(rows, most))
     hats = [np.interp(np.arange(rows), knots, one) for one in np.eye(len(knots))]
     out = np.zeros((len(since_s), len(knots)))
     out[:rows] = np.column_stack(hats) * np.sqrt(1.0 - since_s[:rows, None] / lag_s)
     return out
 
 
-def _of_a_filter(since_s: Array, lag_s: float) -> Array:
+def _of_a_filter(since_s: Array, lag_s: float, most: int) -> Array:
     """The filter's value, which is forgotten with its time constant."""
     return np.exp(-since_s[:, None] / lag_s)
 

@@ -197,6 +197,21 @@ def test_shapes_of_a_large_effect_are_compared_at_one_inflation_and_others_at_th
     assert naming.by_shapes([20.0, 30.0], [1.0, 3.0]) == pytest.approx([20.0, 10.0])
 
 
+def test_a_lag_that_goes_to_and_fro_is_sought_by_a_secant():
+    """About each simulated lag the likeliest one is beyond 0.5, by 0.6 of the distance: the third step is at 0.5."""
+    tried, simulated = [], 0.4
+    for wanted in (0.56, 0.464, 0.5):
+        simulated = by_candidates._next(tried, 0.5 - 0.6 * (simulated - 0.5))
+        assert simulated == pytest.approx(wanted)
+
+
+def test_a_lag_that_comes_nearer_from_one_side_is_simulated_at_its_likeliest_shape():
+    tried, simulated = [], 0.4
+    for wanted in (0.45, 0.475, 0.4875):
+        simulated = by_candidates._next(tried, 0.5 + 0.5 * (simulated - 0.5))
+        assert simulated == pytest.approx(wanted)
+
+
 # --- a learned table --------------------------------------------------------------------------------------------------
 
 

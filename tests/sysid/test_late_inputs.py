@@ -101,6 +101,19 @@ def test_a_delay_shows_what_was_before_a_run_for_as_long_as_it_is(lag_s, rows, n
     assert before[:50].sum(axis=1)[:rows] == pytest.approx(2.0 * np.sqrt(1.0 - STEP_s * np.arange(rows) / lag_s))
 
 
+@pytest.mark.parametrize(("runs", "numbers"), [(4, 8), (10, 4), (50, 1)])
+def test_many_runs_have_fewer_numbers_each_for_what_was_before_them(runs, numbers):
+    """All together at most 40. Each of a run's rows that show it has a part, and the next run's have none."""
+    rows = 30
+    time_s = STEP_s * np.arange(rows * runs) + np.repeat(np.arange(runs), rows)
+    table = Table(time_s, {}, tuple(slice(rows * k, rows * (k + 1)) for k in range(runs)), "runs")
+    given = np.zeros(rows * runs)
+    before = DELAY.before(table, given, given + 1.0, 0.2)
+    assert before.shape[1] == min(40, runs * numbers)
+    reached = np.flatnonzero(before[:, :numbers].sum(axis=1))
+    assert reached.tolist() == list(range(20))
+
+
 def test_a_held_torque_that_comes_late_is_late_by_its_delay_alone():
     """Held values are half a row late on average, which is not the delay's."""
 
