@@ -24,11 +24,12 @@ walk: $(VENV)/.walk
 	@echo "    $(VENV)/bin/ranger-sim walk --fault 'MCH.joint_encoder:stuck@step 6' --out runs/fault    # with a fault"
 	@echo "    $(VENV)/bin/ranger-sim new my-machine    # boards in C, a bus and a body of your own, with tests"
 
-# Tests of a robot at a pace of the wall clock. A page that follows one leaves out what it is too slow for: those of
-# pages have both cores to themselves. The others promise no pace, and go side by side with the rest.
+# Tests of a robot at a pace of the wall clock. A page that follows one leaves out what it is too slow for, and its
+# comparison gives way to everything else: those of pages have both cores to themselves. The others promise no pace, and
+# go side by side with the rest.
 WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_processes.py \
 	tests/tools/run/test_up_view.py tests/tools/panel/test_page.py tests/tools/panel/test_live.py \
-	tests/tools/panel/test_reader.py tests/test_watched.py tests/vm
+	tests/tools/panel/test_reader.py tests/tools/panel/test_comparison.py tests/test_watched.py tests/vm
 ALONE = $(filter tests/tools/panel/% tests/test_watched.py,$(WITH_A_CLOCK))
 # Run by `make docs`.
 PAGES = tests/pages

@@ -73,10 +73,10 @@ class Page:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
-    def until(self, condition, seconds=ANSWER_S):
-        """Wait until a condition of the page holds; AssertionError with it after so long."""
+    def until(self, condition):
+        """Wait until a condition of the page holds; AssertionError with it after ANSWER_S."""
         look = f"({condition}) ? done(true) : tries-- > 0 ? setTimeout(look, 10) : done(false)"
-        script = f"new Promise((done) => {{ let tries = {100 * seconds}; (function look() {{ {look} }})() }})"
+        script = f"new Promise((done) => {{ let tries = {100 * ANSWER_S}; (function look() {{ {look} }})() }})"
         assert self.value(script), condition
 
     def point(self, x, y):

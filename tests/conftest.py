@@ -56,7 +56,6 @@ LONGEST = (
     "ranger/testing/test_forked_tests.py",
     "sysid/test_api.py",
     "ranger/testing/test_forked_tests_among_plugins.py",
-    "tools/panel/test_comparison.py",
     "boards/test_main_brain_walks_the_bare_body.py",
     "harness/test_supervision.py",
     "can_bus/test_fd_bus.py",
