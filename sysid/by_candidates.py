@@ -404,7 +404,8 @@ def _finer(
     """
     out = list(effects)
     for each in found.named:
-        if each.effect.scale is None:
+        scale = each.effect.scale
+        if scale is None:
             continue
         others = [other for other in found.named if other is not each]
         base = naming.refit(found.base, others, [*fixed, *others]) if others else found.base
@@ -413,8 +414,8 @@ def _finer(
         shapes = [*old.shapes, *(shape for shape in [each.shape, *intervals.between(each)] if shape not in old.shapes)]
         each.shape, _ = intervals.profile(each, base)
         if old.cause in LAGS:
-            following = _next(tried.setdefault(old.name, []), each.shape[old.scale])
-            each.shape = {**each.shape, old.scale: following}
+            following = _next(tried.setdefault(old.name, []), each.shape[scale])
+            each.shape = {**each.shape, scale: following}
         each.effect = dataclasses.replace(old, shapes=shapes)
         # its rivals of the same kind as well: the one with the finer grid would win by it
         kind = (old.cause, old.form, old.scale)
