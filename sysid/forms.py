@@ -17,7 +17,7 @@ from ranger_sim.sysid.machine import Recording
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, but for the shortest
-# What was there before a run: of a delay at most so many numbers, and of all runs together
+# What was there before a run: of a delay at most so many numbers, and of all runs together. Chosen by us
 MOST_BEFORE, MOST_BEFORE_RUNS = 8, 40
 ROUNDED = 1e-6  # of a delay: a row that is so much less after a start is after it
 MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording

@@ -22,7 +22,7 @@ PAYS = 10.0  # gain of the information criterion that an effect must reach
 TIE = 6.0  # effects within this of the best are ties
 EITHER_SIGN = 2.0  # standard errors of 0 within which a coefficient may have either sign
 MOST = 4  # number of accepted effects
-NEARLY = 0.1  # of an inflation: another shape's is the same
+NEARLY = 0.1  # of an inflation: another shape's is the same. Chosen by us
 
 
 @dataclasses.dataclass

@@ -179,9 +179,7 @@ class TrajectoryFit:
         new = self.acted_on(acting, fixed=False)
         new.x, new.u, start = self.began
         new.p = np.concatenate((start[:count], np.zeros(len(new.p) - count)))
-        new.damped = np.concatenate(
-            (np.zeros(count), np.full(len(new.p) - count - new.unknown, DAMPED), np.zeros(new.unknown))
-        )
+        new.damped[count : len(new.p) - new.unknown] = DAMPED
         new.came_from, new.predictor = (new.x, new.u, new.p), None
         new.noise_y = self.shown_y
         return new
